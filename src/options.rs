@@ -1,0 +1,101 @@
+//! Every option, with its default, unit, range and advice.
+
+use crate::error::Error;
+
+/// What to estimate, and how. `Options::default()` is right for most scans.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Options {
+    /// How a normal is found. Default: [`Method::Bilinear`].
+    pub method: Method,
+    /// Edge of the cubes. Default: [`Cell::Auto`].
+    pub cell: Cell,
+    /// Number of neighbours of the baselines; `None` is their default.
+    pub k: Option<u32>,
+    /// How signs are chosen. Default: [`Orient::None`].
+    pub orient: Orient,
+    /// Whether to return the surface variation of every point too. Default: no.
+    pub curvature: bool,
+}
+
+/// How a normal is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Method {
+    /// Bilinear interpolation between nodes on a grid of cubes: the paper's method.
+    #[default]
+    Bilinear,
+    /// Principal component analysis of the k nearest neighbours: the paper's ENN.
+    Knn,
+    /// Elliptic Gabriel graph and a local quadratic fit: the paper's EGG.
+    Egg,
+}
+
+/// Edge of the cubes.
+///
+/// Small cubes follow detail and edges, large ones average noise away. What counts is the number of points in an
+/// occupied cube: about 4 suit clean scans, 15 to 60 noisy ones.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub enum Cell {
+    /// The edge that puts about 4 points into an occupied cube, found from the data; stray points do not change it.
+    #[default]
+    Auto,
+    /// Multiples of the paper's L (Eq. 1), 0.1 to 100; the paper advises 1.0 to 1.5. L is defined by the bounding box:
+    /// a single stray point enlarges it.
+    Scale(f64),
+    /// Cube edge in the units of the input, above 0.
+    Size(f64),
+}
+
+/// How the sign of a normal is chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub enum Orient {
+    /// Deterministic, and nothing more: `x + 2y + 4z >= 0` for every normal.
+    #[default]
+    None,
+    /// One sign for each connected surface.
+    Consistent,
+    /// Outwards, for closed surfaces.
+    Outward,
+    /// Towards a position, in the coordinates of the input.
+    Viewpoint([f64; 3]),
+    /// Towards a direction.
+    Up([f64; 3]),
+}
+
+impl Options {
+    /// Refuses values out of range, and what this version does not offer.
+    pub fn validate(&self) -> Result<(), Error> {
+        match self.cell {
+            Cell::Auto => {}
+            Cell::Scale(scale) if (0.1..=100.0).contains(&scale) => {}
+            Cell::Scale(scale) => {
+                return Err(Error::Input(format!("cell.scale is {scale}; wanted a number from 0.1 to 100")));
+            }
+            Cell::Size(size) if size > 0.0 && size.is_finite() => {}
+            Cell::Size(size) => {
+                return Err(Error::Input(format!("cell.size is {size}; wanted a finite number above 0")));
+            }
+        }
+        if self.k == Some(0) {
+            return Err(Error::Input("k is 0; wanted a whole number of at least 1".into()));
+        }
+        let unsupported = |what: &str, offered: &str| {
+            Err(Error::Unsupported(format!("{what} is not in this version; it offers {offered}")))
+        };
+        match self.method {
+            Method::Bilinear => {}
+            Method::Knn => return unsupported("method 'knn'", "'bilinear'"),
+            Method::Egg => return unsupported("method 'egg'", "'bilinear'"),
+        }
+        match self.orient {
+            Orient::None => {}
+            Orient::Consistent => return unsupported("orient 'consistent'", "'none'"),
+            Orient::Outward => return unsupported("orient 'outward'", "'none'"),
+            Orient::Viewpoint(_) => return unsupported("orient by viewpoint", "'none'"),
+            Orient::Up(_) => return unsupported("orient by up direction", "'none'"),
+        }
+        if self.curvature {
+            return unsupported("curvature", "normals only");
+        }
+        Ok(())
+    }
+}
