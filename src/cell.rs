@@ -5,7 +5,6 @@ use crate::options::Cell;
 use crate::parallel;
 use crate::points::{Bounds, Bulk, CHUNK, Points};
 use glam::{DVec3, UVec3, Vec3};
-use std::collections::BTreeMap;
 
 /// Points in an occupied cube that 'auto' aims at: with the 26 cubes round it some 36 points, as accurate on clean
 /// surfaces as 30 nearest neighbours.
@@ -14,8 +13,8 @@ const POINTS_PER_CELL: f64 = 4.0;
 /// How many places 'auto' looks at.
 const PROBES: usize = 256;
 
-/// At these places 'auto' counts this many points, or the 64th part of the cloud if that is more.
-const PROBED_POINTS: f64 = 65536.0;
+/// At these places 'auto' counts about this many points, or the 64th part of the cloud if that is more.
+const PROBED_POINTS: f64 = 32768.0;
 
 /// Halvings of a probe's edge that 'auto' counts.
 const LEVELS: u32 = 10;
@@ -78,7 +77,8 @@ fn populated_edge(points: &Points, bounds: &Bounds) -> f64 {
 struct Probes {
     origin: DVec3,
     edge: f64,
-    chosen: BTreeMap<[i64; 3], u32>,
+    /// Sorted by cube.
+    chosen: Vec<([i64; 3], u32)>,
     /// A bit for each of 2^16 hashes of a cube: turns most points away at once.
     filter: Vec<u64>,
 }
@@ -91,23 +91,19 @@ impl Probes {
         sample.dedup();
         let wanted = (PROBED_POINTS / count as f64).max(1.0 / 64.0);
         let step = sample.len().div_ceil(PROBES).max(1);
-        let mut probes = Self { origin: bulk.median, edge: extent, chosen: BTreeMap::new(), filter: vec![0; 1024] };
+        let mut probes = Self { origin: bulk.median, edge: extent, chosen: Vec::new(), filter: vec![0; 1024] };
         for halvings in 0..64 {
             probes.edge = extent * (-f64::from(halvings)).exp2();
-            probes.chosen.clear();
-            for point in sample.iter().step_by(step) {
-                *probes.chosen.entry(probes.cube(*point).0).or_default() += 1;
-            }
-            let others = sample
-                .iter()
-                .enumerate()
-                .filter(|(i, point)| i % step != 0 && probes.chosen.contains_key(&probes.cube(**point).0))
-                .count();
+            let mut cubes: Vec<[i64; 3]> = sample.iter().step_by(step).map(|p| probes.cube(*p).0).collect();
+            cubes.sort_unstable();
+            probes.chosen = cubes.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as u32)).collect();
+            let is_inside = |point: &DVec3| probes.search(probes.cube(*point).0).is_some();
+            let others = sample.iter().enumerate().filter(|(i, point)| i % step != 0 && is_inside(point)).count();
             if others as f64 <= wanted * sample.len() as f64 {
                 break;
             }
         }
-        for cube in probes.chosen.keys() {
+        for (cube, _) in &probes.chosen {
             let bit = hash(*cube);
             probes.filter[bit / 64] |= 1 << (bit % 64);
         }
@@ -121,20 +117,27 @@ impl Probes {
         (floor.as_i64vec3().to_array(), place - floor)
     }
 
-    fn find(&self, cube: [i64; 3]) -> bool {
+    /// The number of the probe at a cube.
+    fn find(&self, cube: [i64; 3]) -> Option<u32> {
         let bit = hash(cube);
-        self.filter[bit / 64] >> (bit % 64) & 1 == 1 && self.chosen.contains_key(&cube)
+        if self.filter[bit / 64] >> (bit % 64) & 1 == 1 { self.search(cube) } else { None }
+    }
+
+    fn search(&self, cube: [i64; 3]) -> Option<u32> {
+        self.chosen.binary_search_by_key(&cube, |(cube, _)| *cube).ok().map(|probe| probe as u32)
     }
 
     /// Points in an occupied cube for the probes' edge halved 0 to [`LEVELS`] times.
     fn count(&self, points: &Points) -> Vec<f64> {
-        // The points of a probe, as Morton codes: points in one cube of any level share the code's first bits.
+        // The probe of each point, then a Morton code: points in one cube of any level share the first bits.
         let tasks: Vec<&[Vec3]> = points.positions.chunks(CHUNK).collect();
-        let mut found: Vec<([i64; 3], u32)> = parallel::map(tasks, |chunk| {
+        let mut found: Vec<u64> = parallel::map(tasks, |chunk| {
             let cubes = chunk.iter().filter(|p| p.is_finite()).map(|p| self.cube(p.as_dvec3()));
             cubes
-                .filter(|(cube, _)| self.find(*cube))
-                .map(|(cube, place)| (cube, morton((place * f64::from(1 << LEVELS)).as_uvec3())))
+                .filter_map(|(cube, place)| Some((self.find(cube)?, place)))
+                .map(|(probe, place)| {
+                    u64::from(probe) << (3 * LEVELS) | u64::from(morton((place * f64::from(1 << LEVELS)).as_uvec3()))
+                })
                 .collect::<Vec<_>>()
         })
         .concat();
@@ -142,12 +145,12 @@ impl Probes {
 
         let mut share = vec![0.0; LEVELS as usize + 1];
         let mut chosen = 0.0;
-        for probe in found.chunk_by(|a, b| a.0 == b.0) {
-            let weight = f64::from(self.chosen.get(&probe[0].0).copied().unwrap_or(0));
+        for probe in found.chunk_by(|a, b| a >> (3 * LEVELS) == b >> (3 * LEVELS)) {
+            let weight = f64::from(self.chosen[(probe[0] >> (3 * LEVELS)) as usize].1);
             chosen += weight;
             for (level, share) in share.iter_mut().enumerate() {
                 let shift = 3 * (LEVELS - level as u32);
-                let occupied = probe.chunk_by(|a, b| a.1 >> shift == b.1 >> shift).count();
+                let occupied = probe.chunk_by(|a, b| a >> shift == b >> shift).count();
                 *share += weight * occupied as f64 / probe.len() as f64;
             }
         }

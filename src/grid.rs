@@ -2,7 +2,7 @@
 
 use crate::bricks::{Bricks, set_bits};
 use crate::error::Error;
-use crate::lattice::{Lattice, cube_in_brick, from_cube_centre};
+use crate::lattice::{Lattice, cube_centre, cube_in_brick};
 use crate::parallel::{self, Scatter};
 use crate::pca::Moments;
 use crate::points::{CHUNK, Points, reserve};
@@ -36,6 +36,8 @@ pub(crate) struct Grid {
     pub first_cube: Vec<u32>,
     /// For each brick its first point; one more at the end.
     pub first_point: Vec<u32>,
+    /// For each cube its last point, plus one.
+    pub cube_end: Vec<u32>,
     /// The points within the grid, sorted.
     pub placed: Vec<Placed>,
 }
@@ -45,7 +47,7 @@ impl Grid {
     pub fn sort(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<Self, Error> {
         let bricks = Bricks::find(points, lattice, &stage.part(0.0..0.2))?;
         let (first_point, mut placed) = sort_into_bricks(points, lattice, &bricks, stage)?;
-        let masks = sort_bricks(&first_point, &mut placed, &stage.part(0.8..1.0))?;
+        let (masks, cube_end) = sort_bricks(&first_point, &mut placed, &stage.part(0.8..1.0))?;
         let mut first_cube = Vec::new();
         reserve(&mut first_cube, masks.len() + 1, "the grid")?;
         let mut total = 0;
@@ -54,12 +56,12 @@ impl Grid {
             total += mask.count_ones();
             first_cube.push(total);
         }
-        Ok(Self { bricks, masks, first_cube, first_point, placed })
+        Ok(Self { bricks, masks, first_cube, first_point, cube_end, placed })
     }
 
     /// How many cubes hold points.
     pub fn cubes(&self) -> usize {
-        *self.first_cube.last().unwrap_or(&0) as usize
+        self.cube_end.len()
     }
 
     /// The moments of every cube (the ten sums behind the paper's Eq. 5 and 6).
@@ -72,10 +74,9 @@ impl Grid {
         stage.run(blocks.into_iter().zip(pieces).collect(), |(bricks, moments): (Range<usize>, &mut [Moments])| {
             let mut moments = moments.iter_mut();
             for brick in bricks {
-                for (cube, _) in self.cubes_of(brick) {
-                    if let Some(moments) = moments.next() {
-                        *moments = Moments::of(cube.iter().map(|placed| from_cube_centre(placed.local)));
-                    }
+                for ((points, bit), moments) in self.cubes_of(brick).zip(&mut moments) {
+                    let centre = cube_centre(bit);
+                    *moments = Moments::of(points.iter().map(|placed| placed.local - centre));
                 }
             }
         })?;
@@ -84,10 +85,13 @@ impl Grid {
 
     /// The occupied cubes of a brick in their order: the points of each, and its bit in the mask.
     pub fn cubes_of(&self, brick: usize) -> impl Iterator<Item = (&[Placed], u32)> {
-        let range = self.first_point[brick] as usize..self.first_point[brick + 1] as usize;
-        self.placed[range]
-            .chunk_by(|a, b| cube_in_brick(a.local) == cube_in_brick(b.local))
-            .map(|cube| (cube, cube_in_brick(cube[0].local)))
+        let cubes = self.first_cube[brick] as usize..self.first_cube[brick + 1] as usize;
+        let mut start = self.first_point[brick] as usize;
+        self.cube_end[cubes].iter().zip(set_bits(self.masks[brick])).map(move |(&end, bit)| {
+            let points = &self.placed[start..end as usize];
+            start = end as usize;
+            (points, bit)
+        })
     }
 
     /// Runs of bricks that hold some ten thousand points each: the tasks of the later stages.
@@ -160,51 +164,63 @@ fn sort_into_bricks(
     Ok((first_point, placed))
 }
 
-/// Sorts the points of each brick by cube, stable, and answers which cubes are occupied.
-fn sort_bricks(first_point: &[u32], placed: &mut [Placed], stage: &Stage) -> Result<Vec<u64>, Error> {
+/// Sorts the points of each brick by cube, stable; answers for each brick which cubes are occupied, and for each cube
+/// where its points end.
+fn sort_bricks(first_point: &[u32], placed: &mut [Placed], stage: &Stage) -> Result<(Vec<u64>, Vec<u32>), Error> {
     let blocks = blocks(first_point);
     let pieces = split(placed, blocks.iter().map(|bricks| first_point[bricks.end] as usize));
     let tasks = blocks.into_iter().zip(pieces).collect();
-    let masks = stage.run(tasks, |(bricks, mut placed): (Range<usize>, &mut [Placed])| {
+    let sorted = stage.run(tasks, |(bricks, mut placed): (Range<usize>, &mut [Placed])| {
         let mut scratch: Vec<Placed> = Vec::new();
-        let mut masks = Vec::with_capacity(bricks.len());
+        let (mut masks, mut ends) = (Vec::with_capacity(bricks.len()), Vec::with_capacity(16 * bricks.len()));
         for brick in bricks {
             let (points, rest) = placed.split_at_mut((first_point[brick + 1] - first_point[brick]) as usize);
             placed = rest;
-            masks.push(sort_brick(points, &mut scratch)?);
+            scratch.clear();
+            if scratch.capacity() < points.len() {
+                reserve(&mut scratch, points.len(), "the sorted points")?;
+            }
+            scratch.extend_from_slice(points);
+            let counts = sort_brick(&scratch, points);
+            let mut end = first_point[brick];
+            let mut mask = 0;
+            for (bit, count) in counts.into_iter().enumerate().filter(|(_, count)| *count > 0) {
+                mask |= 1 << bit;
+                end += count;
+                ends.push(end);
+            }
+            masks.push(mask);
         }
-        Ok(masks)
+        Ok((masks, ends))
     })?;
-    let mut all = Vec::new();
-    reserve(&mut all, first_point.len() - 1, "the grid")?;
-    for masks in masks {
-        all.extend(masks?);
+    let sorted = sorted.into_iter().collect::<Result<Vec<_>, Error>>()?;
+    let (mut masks, mut ends) = (Vec::new(), Vec::new());
+    reserve(&mut masks, first_point.len() - 1, "the grid")?;
+    reserve(&mut ends, sorted.iter().map(|(_, ends)| ends.len()).sum(), "the cubes")?;
+    for (block_masks, block_ends) in sorted {
+        masks.extend(block_masks);
+        ends.extend(block_ends);
     }
-    Ok(all)
+    Ok((masks, ends))
 }
 
-/// A counting sort over the 64 cubes of a brick.
-fn sort_brick(points: &mut [Placed], scratch: &mut Vec<Placed>) -> Result<u64, Error> {
-    let mut counts = [0u32; 64];
-    for point in &*points {
+/// A counting sort over the 64 cubes of a brick; answers the number of points in each.
+fn sort_brick(points: &[Placed], sorted: &mut [Placed]) -> [u32; 64] {
+    let mut counts = [0; 64];
+    for point in points {
         counts[cube_in_brick(point.local) as usize] += 1;
     }
-    let (mut mask, mut total) = (0, 0);
-    for (cube, count) in counts.iter_mut().enumerate() {
-        mask |= u64::from(*count > 0) << cube;
-        total += std::mem::replace(count, total);
+    let mut next = counts;
+    let mut total = 0;
+    for next in &mut next {
+        total += std::mem::replace(next, total);
     }
-    scratch.clear();
-    if scratch.capacity() < points.len() {
-        reserve(scratch, points.len(), "the sorted points")?;
-    }
-    scratch.extend_from_slice(points);
-    for point in &*scratch {
-        let next = &mut counts[cube_in_brick(point.local) as usize];
-        points[*next as usize] = *point;
+    for point in points {
+        let next = &mut next[cube_in_brick(point.local) as usize];
+        sorted[*next as usize] = *point;
         *next += 1;
     }
-    Ok(mask)
+    counts
 }
 
 fn blocks(first_point: &[u32]) -> Vec<Range<usize>> {

@@ -1,6 +1,6 @@
 //! From a position to its cube, and back.
 
-use glam::{DVec3, IVec3, Vec3};
+use glam::{DVec3, IVec3, UVec3, Vec3};
 
 /// Cubes along the edge of a brick.
 pub(crate) const BRICK: i32 = 4;
@@ -12,13 +12,11 @@ const CUBES: f64 = (1 << 30) as f64;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lattice {
     /// The lowest corner.
-    pub base: DVec3,
-    /// The edge of a cube.
-    pub edge: f64,
+    base: DVec3,
     /// 1 / edge.
     scale: f64,
     /// Cubes along each axis.
-    pub size: DVec3,
+    size: DVec3,
 }
 
 impl Lattice {
@@ -29,7 +27,7 @@ impl Lattice {
         let scale = 1.0 / edge;
         // The same product as in `locate`, so that the point on the maximum falls into the last cube.
         let size = (((max - base) * scale).floor() + 1.0).clamp(DVec3::ONE, DVec3::splat(CUBES));
-        Self { base, edge, scale, size }
+        Self { base, scale, size }
     }
 
     /// Bricks along each axis.
@@ -64,8 +62,8 @@ pub(crate) fn cube_in_brick(local: Vec3) -> u32 {
     cube.x + 4 * cube.y + 16 * cube.z
 }
 
-/// The place of a point against the centre of its cube, -0.5 to 0.5.
+/// The centre of the cube with bit `bit`, in the brick.
 #[inline]
-pub(crate) fn from_cube_centre(local: Vec3) -> Vec3 {
-    local - local.floor() - 0.5
+pub(crate) fn cube_centre(bit: u32) -> Vec3 {
+    UVec3::new(bit & 3, bit >> 2 & 3, bit >> 4).as_vec3() + 0.5
 }

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::grid::{Grid, Placed, Surroundings, steps};
-use crate::lattice::from_cube_centre;
+use crate::lattice::cube_centre;
 use crate::nodes::Node;
 use crate::parallel::Scatter;
 use crate::points::reserve;
@@ -140,8 +140,9 @@ impl<'a> Cube<'a> {
     fn interpolate<const AXIS: usize>(&self, points: &[Placed], resolve: &mut impl FnMut(Vec3, usize, u32)) {
         // What the points of each octant share, from when the first of them asks.
         let mut octants = [const { None }; 8];
+        let centre = cube_centre(self.bit);
         for placed in points {
-            let point = from_cube_centre(placed.local);
+            let point = placed.local - centre;
             let (u, v, w) = (point[(AXIS + 1) % 3], point[(AXIS + 2) % 3], point[AXIS]);
             let number = usize::from(u >= 0.0) + 2 * usize::from(v >= 0.0) + 4 * usize::from(w >= 0.0);
             let octant = octants[number].get_or_insert_with(|| Octant::new(&self.columns[number / 4], number));

@@ -13,17 +13,6 @@ pub(crate) fn threads() -> usize {
     return 1;
 }
 
-/// Calls `work` once for each task.
-pub(crate) fn for_each<T: Send>(tasks: Vec<T>, work: impl Fn(T) + Send + Sync) {
-    #[cfg(feature = "parallel")]
-    {
-        use rayon::prelude::*;
-        tasks.into_par_iter().with_max_len(1).for_each(work);
-    }
-    #[cfg(not(feature = "parallel"))]
-    tasks.into_iter().for_each(work);
-}
-
 /// Calls `work` once for each task and collects the answers in the order of the tasks.
 pub(crate) fn map<T: Send, R: Send>(tasks: Vec<T>, work: impl Fn(T) -> R + Send + Sync) -> Vec<R> {
     #[cfg(feature = "parallel")]
