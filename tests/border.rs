@@ -1,7 +1,7 @@
 //! The border, called as JavaScript calls it, in headless Node.
 #![cfg(target_arch = "wasm32")]
 
-use bilinormal::wasm::{Buffer, Estimation, estimate};
+use bilinormal::wasm::{Buffer, Estimation, estimate, read_ply, write_cloud, write_ply};
 use js_sys::{Function, JSON, Reflect, Uint8Array, WebAssembly};
 use wasm_bindgen::prelude::*;
 use wasm_bindgen_test::wasm_bindgen_test;
@@ -98,7 +98,8 @@ fn normals_of_a_sphere_are_unit_vectors_close_to_the_truth() {
 #[wasm_bindgen_test]
 fn the_report_has_every_field_of_the_contract() {
     let points = single(&sphere());
-    let options = options(r#"{ "method": "bilinear", "cell": { "scale": 1.5 }, "orient": "none", "curvature": false }"#);
+    let options =
+        options(r#"{ "method": "bilinear", "cell": { "scale": 1.5 }, "orient": "none", "curvature": false }"#);
     let report = estimate(floats(&points), false, &options, &nobody()).unwrap().report().into();
     assert_eq!(number(&report, "points"), POINTS as f64);
     assert_eq!(number(&report, "unresolved"), 0.0);
@@ -106,7 +107,8 @@ fn the_report_has_every_field_of_the_contract() {
     assert!(number(&report, "nodes") > 0.0);
     assert!(number(&report, "cellSize") > 0.0);
     assert_eq!(number(&report, "scale"), 1.5);
-    let counts = |name| js_sys::Array::from(&get(&report, name)).iter().map(|n| n.as_f64().unwrap()).collect::<Vec<_>>();
+    let counts =
+        |name| js_sys::Array::from(&get(&report, name)).iter().map(|n| n.as_f64().unwrap()).collect::<Vec<_>>();
     assert_eq!(counts("grid").len(), 3);
     assert_eq!(counts("nodesUsed").len(), 5);
     assert_eq!(counts("nodesUsed").iter().sum::<f64>(), POINTS as f64);
@@ -183,7 +185,10 @@ fn wrong_options_are_refused_with_what_came_and_what_was_wanted() {
         ("7", "options is 7; wanted an object"),
         (r#"{ "Method": "knn" }"#, "option 'Method' is unknown; wanted any of method, cell, k"),
         (r#"{ "method": "pca" }"#, "method is 'pca'; wanted 'bilinear', 'knn' or 'egg'"),
-        (r#"{ "cell": { "radius": 1 } }"#, r#"cell is {"radius":1}; wanted 'auto', { scale: number } or { size: number }"#),
+        (
+            r#"{ "cell": { "radius": 1 } }"#,
+            r#"cell is {"radius":1}; wanted 'auto', { scale: number } or { size: number }"#,
+        ),
         (r#"{ "cell": { "scale": 1, "size": 2 } }"#, r#"cell is {"scale":1,"size":2}; wanted 'auto'"#),
         (r#"{ "cell": null }"#, "cell is null; wanted 'auto'"),
         (r#"{ "cell": { "scale": "1" } }"#, "cell.scale is '1'; wanted a number"),
@@ -200,6 +205,13 @@ fn wrong_options_are_refused_with_what_came_and_what_was_wanted() {
         assert_eq!(code, "input", "{json}");
         assert!(message.starts_with(wanted), "{json}: {message}");
     }
+}
+
+#[wasm_bindgen_test]
+fn what_this_version_lacks_is_unsupported_and_says_what_it_offers() {
+    let (code, message) = thrown(estimate(floats(&[]), false, &options(r#"{ "method": "egg" }"#), &nobody()));
+    assert_eq!(code, "unsupported");
+    assert!(message.contains("'bilinear'"), "{message}");
 }
 
 #[wasm_bindgen_test]
@@ -235,3 +247,76 @@ fn a_buffer_that_does_not_fit_is_a_limit_error_and_no_trap() {
     }
 }
 
+const TRIANGLE: &str = "ply\nformat ascii 1.0\ncomment three corners\nelement vertex 3\nproperty float x\n\
+    property float y\nproperty float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
+    property float intensity\nend_header\n0 0 0 255 0 0 0.5\n1 0 0 0 255 0 0.25\n0 1 0 0 0 255 1\n";
+
+#[wasm_bindgen_test]
+fn a_ply_file_is_read_into_its_arrays() {
+    let mut cloud = read_ply(filled(TRIANGLE.as_bytes()), None, &nobody()).unwrap();
+    assert_eq!(cloud.count(), 3);
+    assert_eq!(*cloud.origin(), [0.0; 3]);
+    assert_eq!(cloud.format(), "ascii");
+    assert_eq!(cloud.properties(), ["x", "y", "z", "red", "green", "blue", "intensity"]);
+    assert_eq!(cloud.comments(), ["three corners"]);
+    assert_eq!(numbers(&cloud.take_positions().unwrap()), [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    assert_eq!(thrown(cloud.take_positions()).0, "input");
+    assert!(cloud.take_normals().is_none());
+    let colors = view(&cloud.take_colors().unwrap()).to_vec();
+    assert_eq!(colors, [255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255]);
+    assert_eq!(numbers(&cloud.take_intensity().unwrap()), [0.5, 0.25, 1.0]);
+}
+
+#[wasm_bindgen_test]
+fn normals_put_into_a_file_are_read_from_it() {
+    let normals = [0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0];
+    for ascii in [true, false] {
+        let file = write_ply(filled(TRIANGLE.as_bytes()), Some(floats(&normals)), None, ascii, &nobody()).unwrap();
+        let mut cloud = read_ply(file, None, &nobody()).unwrap();
+        assert_eq!(numbers(&cloud.take_normals().unwrap()), normals);
+        assert_eq!(numbers(&cloud.take_intensity().unwrap()), [0.5, 0.25, 1.0]);
+    }
+}
+
+#[wasm_bindgen_test]
+fn a_cloud_alone_becomes_a_file() {
+    let positions = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5];
+    let normals = [0.0, 0.0, 1.0, 0.0, 1.0, 0.0];
+    let origin = [4.5e6, -5.4e6, 0.0];
+    let file = write_cloud(
+        floats(&positions),
+        &origin,
+        Some(floats(&normals)),
+        Some(filled(&[1, 2, 3, 255, 4, 5, 6, 255])),
+        Some(floats(&[0.25, 0.5])),
+        None,
+        vec!["from memory".into()],
+        false,
+        &nobody(),
+    );
+    let mut cloud = read_ply(file.unwrap(), None, &nobody()).unwrap();
+    assert_eq!(cloud.comments(), ["from memory"]);
+    let (read_origin, read) = (cloud.origin(), numbers(&cloud.take_positions().unwrap()));
+    for (i, (read, written)) in read.iter().zip(positions).enumerate() {
+        assert_eq!(f64::from(*read) + read_origin[i % 3], f64::from(written) + origin[i % 3]);
+    }
+    assert_eq!(numbers(&cloud.take_normals().unwrap()), normals);
+    assert_eq!(view(&cloud.take_colors().unwrap()).to_vec(), [1, 2, 3, 255, 4, 5, 6, 255]);
+    assert_eq!(numbers(&cloud.take_intensity().unwrap()), [0.25, 0.5]);
+}
+
+#[wasm_bindgen_test]
+fn a_broken_file_says_where() {
+    let error = read_ply(filled(&TRIANGLE.as_bytes()[..TRIANGLE.len() - 8]), None, &nobody()).unwrap_err();
+    assert_eq!(get(&error, "code"), "format");
+    assert!(get(&error, "line").as_f64().is_some() || get(&error, "byte").as_f64().is_some());
+    assert_eq!(thrown(read_ply(filled(b"solid stl"), None, &nobody())).0, "format");
+}
+
+#[wasm_bindgen_test]
+fn arrays_that_do_not_fit_the_file_are_refused() {
+    let short = write_ply(filled(TRIANGLE.as_bytes()), Some(floats(&[0.0, 0.0, 1.0])), None, true, &nobody());
+    assert_eq!(thrown(short).0, "input");
+    let uneven = write_ply(filled(TRIANGLE.as_bytes()), Some(filled(&[0; 35])), None, true, &nobody());
+    assert_eq!(thrown(uneven).0, "input");
+}

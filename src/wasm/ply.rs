@@ -2,7 +2,7 @@
 
 use super::{Buffer, call};
 use crate::error::Error;
-use crate::ply::{self, Additions, PointCloud, ReadOptions};
+use crate::ply::{self, Additions, Format, PointCloud, ReadOptions};
 use js_sys::Function;
 use wasm_bindgen::prelude::*;
 
@@ -55,7 +55,7 @@ impl Cloud {
     /// The file's format, as its header names it.
     #[wasm_bindgen(getter)]
     pub fn format(&self) -> String {
-        self.rest.format.to_string()
+        self.rest.format.name().into()
     }
 
     /// The names of the properties of a point, in the file's order.
@@ -139,7 +139,9 @@ pub fn write_cloud(
             colors: colors.map(|colors| colors.into_bytes("colors")).transpose()?,
             intensity: intensity.map(|intensity| intensity.into_floats("intensity", 1)).transpose()?,
             comments,
-            ..PointCloud::default()
+            normals: None,
+            format: Format::BinaryLittleEndian,
+            properties: Vec::new(),
         };
         progress.update("write", 0.0)?;
         let file = ply::write_cloud(&cloud, &add, ascii)?;
