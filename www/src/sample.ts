@@ -21,13 +21,13 @@ export function sampleScan(points: number, seed = 7): Uint8Array<ArrayBuffer> {
   const bytes = new Uint8Array(header.length + points * 15);
   bytes.set(header);
   const view = new DataView(bytes.buffer);
-  const shellPoints = Math.round(points * 0.72);
   const shell = sampler(shellSurface, shellRow, random);
   const plinth = sampler(plinthSurface, (u) => u, random);
+  const shellPoints = Math.round((points * shell.area) / (shell.area + plinth.area));
   const position: Vector = [0, 0, 0];
   const color: Vector = [0, 0, 0];
   for (let i = 0, at = header.length; i < points; i++, at += 15) {
-    const [u, v] = (i < shellPoints ? shell : plinth)(position);
+    const [u, v] = (i < shellPoints ? shell : plinth).draw(position);
     (i < shellPoints ? shellColor : plinthColor)(u, v, color);
     for (let axis = 0; axis < 3; axis++) {
       // A scanner's noise: 30 micrometres on a thing of 40 centimetres.
@@ -39,12 +39,12 @@ export function sampleScan(points: number, seed = 7): Uint8Array<ArrayBuffer> {
 }
 
 // The shell: a tube along a logarithmic spiral down a cone.
-const TURNS = 6.2;
+const TURNS = 5.96;
 const GROWTH = Math.log(1.72) / (2 * Math.PI);
 const END = TURNS * 2 * Math.PI;
-const SLOPE = 1.75;
-const SIZE = 0.083;
-const TOP = 0.43;
+const SLOPE = 2.1;
+const SIZE = 0.098;
+const TOP = 0.362;
 
 const angleOf = (u: number) => Math.log(1 + u * (Math.exp(2 * GROWTH * END) - 1)) / (2 * GROWTH);
 
@@ -61,10 +61,10 @@ function shellSurface(u: number, v: number, out: Vector): void {
   const spine = 0.34 * rib ** 8 * Math.exp(-(((around - 0.55) / 0.24) ** 2));
   const cords = 0.018 * Math.cos(22 * around) * (1 - rib ** 4);
   const lip = 0.22 * Math.exp(-(((turn - END) / 0.35) ** 2));
-  const tube = radius * 0.62 * (1 + 0.09 * rib ** 3 + cords + spine + lip);
+  const tube = radius * 0.69 * (1 + 0.09 * rib ** 3 + cords + spine + lip);
   const across = radius + tube * Math.cos(around);
   out[0] = across * Math.cos(turn);
-  out[1] = TOP - 0.012 - radius * SLOPE * 1.32 + tube * 1.12 * Math.sin(around);
+  out[1] = TOP - radius * SLOPE + tube * 1.12 * Math.sin(around);
   out[2] = across * Math.sin(turn);
 }
 
@@ -76,22 +76,19 @@ function shellColor(u: number, v: number, out: Vector): void {
   mix([0.95, 0.89, 0.8], [0.71, 0.36, 0.2], band, out);
 }
 
-// The plinth: a profile turned round the y axis, [radius, height] from the middle of the top to the middle of the foot.
+// The plinth: a profile turned round the y axis, [radius, height] from the middle of the top down to the foot.
 const PROFILE: [number, number][] = [
-  [0, 0.145],
-  [0.128, 0.145],
-  [0.134, 0.139],
-  [0.134, 0.128],
-  [0.122, 0.118],
-  [0.112, 0.112],
-  [0.112, 0.034],
-  [0.124, 0.026],
-  [0.146, 0.02],
-  [0.15, 0.015],
+  [0, 0.06],
+  [0.139, 0.06],
+  [0.144, 0.055],
+  [0.144, 0.049],
+  [0.137, 0.042],
+  [0.137, 0.014],
+  [0.147, 0.008],
+  [0.15, 0.004],
   [0.15, 0],
-  [0, 0],
 ];
-const FLUTES = 28;
+const FLUTES = 36;
 
 function plinthSurface(u: number, v: number, out: Vector): void {
   const at = Math.min(PROFILE.length - 1 - 1e-9, u * (PROFILE.length - 1));
@@ -101,8 +98,8 @@ function plinthSurface(u: number, v: number, out: Vector): void {
   const turn = v * 2 * Math.PI;
   const height = y0 + (y1 - y0) * along;
   let radius = r0 + (r1 - r0) * along;
-  const drum = smooth(0.036, 0.044, height) * (1 - smooth(0.102, 0.11, height));
-  radius -= 0.0065 * drum * Math.abs(Math.sin((turn * FLUTES) / 2)) * (radius > 0.1 ? 1 : 0);
+  const drum = smooth(0.014, 0.018, height) * (1 - smooth(0.038, 0.042, height));
+  radius -= 0.005 * drum * Math.abs(Math.sin((turn * FLUTES) / 2));
   out[0] = radius * Math.cos(turn);
   out[1] = height;
   out[2] = radius * Math.sin(turn);
@@ -134,7 +131,7 @@ function sampler(surface: Surface, row: (u: number) => number, random: () => num
       below[(i - 1) * columns + j - 1] = total;
     }
   }
-  return (out: Vector): [number, number] => {
+  const draw = (out: Vector): [number, number] => {
     const wanted = random() * total;
     let low = 0;
     let high = below.length - 1;
@@ -148,6 +145,7 @@ function sampler(surface: Surface, row: (u: number) => number, random: () => num
     surface(u, v, out);
     return [u, v];
   };
+  return { area: total, draw };
 }
 
 /** Area of a cell from two adjacent corner records of [upper, lower] points: half the cross product of its diagonals. */

@@ -15,7 +15,7 @@ export interface Session {
   cancel(): void;
 }
 
-const SAMPLE_POINTS = 400_000;
+const SAMPLE_POINTS = 500_000;
 
 interface Step {
   signal: AbortSignal;

@@ -21,7 +21,7 @@ export interface Viewer {
   show(cloud: Cloud, bounds: Bounds, up: Up): void;
   setNormals(normals: Float32Array): void;
   setShading(shading: Shading): void;
-  /** 1 is the size at which the points of an even surface just about touch. */
+  /** 1 is the size at which the points of a surface just about close it. */
   setPointSize(size: number): void;
   setUp(up: Up): void;
   /** Frames the whole cloud from the first point of view. */
@@ -127,8 +127,9 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   /** Size of a point in world units, and larger where a part of the cloud has to stand for the whole. */
   function setSize(drawn: number): void {
     if (!cloud || !bounds) return;
-    // An even closed surface of this radius has about 2 pi r^2 of area in view of one side.
-    const spacing = bounds.radius * Math.sqrt((2 * Math.PI) / Math.max(1, cloud.positions.length / 3));
+    // The surface of a scan has about as much area as the sphere round it; points without order need 1.6 times the
+    // spacing of an even pattern to close it.
+    const spacing = 1.6 * bounds.radius * Math.sqrt((4 * Math.PI) / Math.max(1, cloud.positions.length / 3));
     material.size = pointSize * spacing * Math.min(2, Math.sqrt(1 / drawn));
   }
 
@@ -145,7 +146,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     const free = Math.min(1, (width - margins.right) / height, (height - margins.bottom) / height);
     const distance = bounds.radius / Math.sin((camera.fov * Math.PI) / 360) / Math.max(0.2, free);
     controls.target.set(0, 0, 0);
-    camera.position.copy(new Vector3(0.55, 0.42, 1).setLength(distance));
+    camera.position.copy(new Vector3(0.5, 0.36, 1).setLength(distance));
     controls.minDistance = bounds.radius * 1e-3;
     controls.maxDistance = Math.max(bounds.reach, distance) * 20;
     controls.update();
