@@ -4,7 +4,7 @@ import { element, showState } from './panel';
 import { createSession, type Session } from './session';
 import { createStore, type CellKind, type Store } from './state';
 import { missing } from './support';
-import { createViewer, type Shading, type Up, type Viewer } from './viewer';
+import { createViewer, type Margins, type Shading, type Up, type Viewer } from './viewer';
 
 const store = createStore();
 drawHero(element('#hero'));
@@ -46,18 +46,22 @@ function start(viewer: Viewer): void {
   takeControls(session, viewer);
 
   // On a small screen the panel would hide the cloud: it starts closed there.
-  const panel = element<HTMLDetailsElement>('#panel');
-  panel.open = !small.matches;
-  const margins = () => viewer.setMargins(small.matches || panel.hidden ? 0 : panel.offsetWidth, 0);
-  small.addEventListener('change', margins);
-  let shown: string | undefined;
+  element<HTMLDetailsElement>('#panel').open = !small.matches;
+  small.addEventListener('change', () => viewer.setMargins(marginsOf(small)));
+  let named: string | undefined;
   store.listen(({ scan }) => {
-    if (scan?.name === shown) return;
-    shown = scan?.name;
-    margins();
+    if (scan?.name !== named) viewer.setMargins(marginsOf(small));
+    named = scan?.name;
   });
 
   if (new URLSearchParams(location.search).has('sample')) void session.openSample();
+}
+
+/** What the panel and the status line cover: the right edge, or on a small screen top and bottom. */
+function marginsOf(small: MediaQueryList): Margins {
+  const { offsetWidth: width, offsetTop: gap } = element('#panel');
+  if (!small.matches) return { top: 0, right: width + gap, bottom: 0 };
+  return { top: element('#panel > summary').offsetHeight + gap, right: 0, bottom: 150 };
 }
 
 /** Files dropped anywhere on the window. */

@@ -13,6 +13,12 @@ export function element<T extends HTMLElement>(selector: string): T {
 const make = (tag: string, text: string, className = '') =>
   Object.assign(document.createElement(tag), { textContent: text, className });
 
+function fact(value: string, name: string): HTMLElement {
+  const item = make('li', ` ${name}`);
+  item.prepend(make('b', value));
+  return item;
+}
+
 export function showState(store: Store): void {
   const start = element('#start');
   const panel = element<HTMLDetailsElement>('#panel');
@@ -92,7 +98,7 @@ function showResult(scan: Scan | undefined, report: Report | undefined): void {
   if (!scan) return;
   element('#total').textContent = report ? duration(report.milliseconds.total) : count(scan.points);
   element('#total-label').textContent = report
-    ? `for the normals of ${plural(report.points, 'point')}`
+    ? `for ${plural(report.points, 'point')}`
     : 'points, without normals';
 
   const facts = element('#facts');
@@ -104,11 +110,11 @@ function showResult(scan: Scan | undefined, report: Report | undefined): void {
   if (!report) return;
 
   facts.append(
-    make('li', plural(report.cells, 'cube')),
-    make('li', plural(report.nodes, 'node')),
-    make('li', `${count(report.unresolved)} unresolved`),
-    make('li', `edge ${measure(report.cellSize)} = ${measure(report.scale)} L`),
-    make('li', plural(report.threads, 'thread')),
+    fact(count(report.cells), 'cubes'),
+    fact(count(report.nodes), 'nodes'),
+    fact(count(report.unresolved), 'unresolved'),
+    fact(measure(report.cellSize), `edge, ${measure(report.scale)} L`),
+    fact(count(report.threads), report.threads === 1 ? 'thread' : 'threads'),
   );
   facts.dataset['mode'] = report.mode;
 

@@ -26,8 +26,14 @@ export interface Viewer {
   setUp(up: Up): void;
   /** Frames the whole cloud from the first point of view. */
   fit(): void;
-  /** Width and height in pixels of what covers the right and the bottom edge, to be kept out of the frame. */
-  setMargins(right: number, bottom: number): void;
+  /** Pixels at the edges that are covered: the cloud is framed in the rest. */
+  setMargins(margins: Margins): void;
+}
+
+export interface Margins {
+  top: number;
+  right: number;
+  bottom: number;
 }
 
 /** While the camera moves, clouds above this size may be drawn in part, if whole frames take too long. */
@@ -69,7 +75,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   let sparse: BufferGeometry | undefined;
   let shading: Shading = 'shaded';
   let pointSize = 1;
-  let margins = { right: 0, bottom: 0 };
+  let margins: Margins = { top: 0, right: 0, bottom: 0 };
 
   let frame = 0;
   let lastFrame = 0;
@@ -142,11 +148,13 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
 
   function fit(): void {
     if (!bounds) return;
-    const { clientWidth: width, clientHeight: height } = canvas;
-    const free = Math.min(1, (width - margins.right) / height, (height - margins.bottom) / height);
-    const distance = bounds.radius / Math.sin((camera.fov * Math.PI) / 360) / Math.max(0.2, free);
+    const [x, y, z] = bounds.extent;
+    const box = new Vector3(x, y, z).applyEuler(turned.rotation);
+    const flat = 1 - Math.min(1, Math.abs(box.y) / Math.max(Math.abs(box.x), Math.abs(box.z), Number.MIN_VALUE));
+    const direction = new Vector3(0.5, 0.36 + 0.45 * flat, 1).normalize();
+    const distance = 1.06 * framingDistance(direction, box.multiplyScalar(0.5), bounds.radius);
     controls.target.set(0, 0, 0);
-    camera.position.copy(new Vector3(0.5, 0.36, 1).setLength(distance));
+    camera.position.copy(direction).multiplyScalar(distance);
     controls.minDistance = bounds.radius * 1e-3;
     controls.maxDistance = Math.max(bounds.reach, distance) * 20;
     controls.update();
@@ -155,13 +163,30 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     request();
   }
 
+  /** How far away, looking along `direction`, the box (half edges) or the ball round it just fills the free window. */
+  function framingDistance(direction: Vector3, half: Vector3, radius: number): number {
+    const { clientWidth: width, clientHeight: height } = canvas;
+    const slope = Math.tan((camera.fov * Math.PI) / 360) / height;
+    const across = slope * Math.max(width - margins.right, width / 4);
+    const upright = slope * Math.max(height - margins.top - margins.bottom, height / 4);
+    const right = new Vector3(0, 1, 0).cross(direction).normalize();
+    const above = new Vector3().crossVectors(direction, right);
+    let distance = 0;
+    for (let corner = 0; corner < 8; corner++) {
+      const at = half.clone().multiply(new Vector3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1));
+      const beside = Math.max(Math.abs(at.dot(right)) / across, Math.abs(at.dot(above)) / upright);
+      distance = Math.max(distance, beside + at.dot(direction));
+    }
+    return Math.min(distance || Infinity, radius / Math.sin(Math.atan(Math.min(across, upright))));
+  }
+
   function resize(): void {
     const { clientWidth: width, clientHeight: height } = canvas;
     if (width === 0 || height === 0) return;
     renderer.setSize(width, height, false);
     camera.aspect = width / height;
     // The middle of what is not covered is the middle of the view.
-    camera.setViewOffset(width, height, margins.right / 2, margins.bottom / 2, width, height);
+    camera.setViewOffset(width, height, margins.right / 2, (margins.bottom - margins.top) / 2, width, height);
     request();
   }
 
@@ -238,8 +263,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       request();
     },
     fit,
-    setMargins(right, bottom) {
-      margins = { right, bottom };
+    setMargins(next) {
+      margins = next;
       resize();
     },
   };
