@@ -1,12 +1,16 @@
 //! Positions relative to a double-precision origin.
 
 use crate::error::Error;
+use crate::parallel;
 use bytemuck::cast_slice;
 use glam::{DVec3, Vec3};
 use std::borrow::Cow;
 
 /// How many points a robust look at a cloud samples.
 const SAMPLE: usize = 4096;
+
+/// How many points a task takes: enough to be worth a task, few enough to stay in a cache.
+pub(crate) const CHUNK: usize = 1 << 16;
 
 /// A cloud as the estimator takes it: single-precision positions relative to a double-precision origin.
 ///
@@ -29,7 +33,7 @@ impl<'a> Points<'a> {
     pub fn from_f64(coordinates: &[f64]) -> Result<Points<'static>, Error> {
         check_length(coordinates.len())?;
         let points: &[DVec3] = cast_slice(coordinates);
-        let Bulk { median, extent } = Bulk::of(points.len(), &|i| points[i]);
+        let Bulk { median, extent, .. } = Bulk::of(points.len(), &|i| points[i]);
         // A power of two, so that scaling loses nothing.
         let unit = if extent > 1e30 || (extent > 0.0 && extent < 1e-30) { extent.log2().round().exp2() } else { 1.0 };
         let mut positions = Vec::new();
@@ -62,25 +66,91 @@ pub(crate) fn reserve<T>(items: &mut Vec<T>, count: usize, what: &str) -> Result
     items.try_reserve_exact(count).map_err(|_| Error::memory(what, needed))
 }
 
+/// The box round all finite points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Bounds {
+    pub min: Vec3,
+    pub max: Vec3,
+    /// How many points are finite in all three coordinates.
+    pub finite: usize,
+}
+
+impl Bounds {
+    const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY, finite: 0 };
+
+    /// One pass over the points.
+    pub fn of(points: &Points) -> Self {
+        parallel::map(points.positions.chunks(CHUNK).collect(), Self::of_chunk)
+            .into_iter()
+            .fold(Self::EMPTY, Self::join)
+    }
+
+    /// The sides of the box; zero when no point is finite.
+    pub fn extent(&self) -> DVec3 {
+        if self.finite == 0 { DVec3::ZERO } else { self.max.as_dvec3() - self.min.as_dvec3() }
+    }
+
+    fn join(self, other: Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max), finite: self.finite + other.finite }
+    }
+
+    fn of_chunk(chunk: &[Vec3]) -> Self {
+        // Four points are three vectors of four lanes, which the compiler compares at once.
+        const LANES: usize = 12;
+        let (blocks, rest) = bytemuck::cast_slice::<Vec3, f32>(chunk).as_chunks::<LANES>();
+        let (mut min, mut max, mut spoilt) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES], [0.0; LANES]);
+        for block in blocks {
+            for lane in 0..LANES {
+                let value = block[lane];
+                min[lane] = if value < min[lane] { value } else { min[lane] };
+                max[lane] = if value > max[lane] { value } else { max[lane] };
+                // Not a number as soon as one value is infinite or not a number.
+                spoilt[lane] += value - value;
+            }
+        }
+        if spoilt.iter().any(|s| s.is_nan()) {
+            return Self::of_points(chunk);
+        }
+        let lanes = |lanes: [f32; LANES]| bytemuck::cast::<_, [Vec3; 4]>(lanes);
+        let bounds = Self {
+            min: lanes(min).into_iter().fold(Vec3::INFINITY, Vec3::min),
+            max: lanes(max).into_iter().fold(Vec3::NEG_INFINITY, Vec3::max),
+            finite: 4 * blocks.len(),
+        };
+        bounds.join(Self::of_points(bytemuck::cast_slice(rest)))
+    }
+
+    fn of_points(points: &[Vec3]) -> Self {
+        points
+            .iter()
+            .filter(|p| p.is_finite())
+            .fold(Self::EMPTY, |bounds, &point| bounds.join(Self { min: point, max: point, finite: 1 }))
+    }
+}
+
 /// Where most of a cloud lies, from a sample; a few stray points do not move it.
 pub(crate) struct Bulk {
     /// The median of each axis.
     pub median: DVec3,
     /// The longest side of the box that holds the middle 90 % of each axis.
     pub extent: f64,
+    /// The finite points looked at.
+    pub sample: Vec<DVec3>,
 }
 
 impl Bulk {
     /// Looks at `at(0) .. at(count - 1)`, at most a few thousand of them; non-finite points are passed over.
     pub fn of(count: usize, at: &dyn Fn(usize) -> DVec3) -> Self {
         let step = count.div_ceil(SAMPLE).max(1);
-        let sample: Vec<DVec3> = (0..count).step_by(step).map(at).filter(|p| p.is_finite()).collect();
-        let mut bulk = Self { median: DVec3::ZERO, extent: 0.0 };
-        if sample.is_empty() {
+        // A different place in each stride, so that the rows of a scan do not fall in step with the sample.
+        let place = |i: usize| (i * step + i.wrapping_mul(0x9E37_79B9) % step).min(count - 1);
+        let sample: Vec<DVec3> = (0..count.div_ceil(step)).map(|i| at(place(i))).filter(|p| p.is_finite()).collect();
+        let mut bulk = Self { median: DVec3::ZERO, extent: 0.0, sample };
+        if bulk.sample.is_empty() {
             return bulk;
         }
         for axis in 0..3 {
-            let mut values: Vec<f64> = sample.iter().map(|p| p[axis]).collect();
+            let mut values: Vec<f64> = bulk.sample.iter().map(|p| p[axis]).collect();
             values.sort_unstable_by(f64::total_cmp);
             let quantile = |q: f64| values[((values.len() - 1) as f64 * q).round() as usize];
             bulk.median[axis] = quantile(0.5);
@@ -93,7 +163,7 @@ impl Bulk {
 /// The origin to subtract from double coordinates before they are rounded to single precision: zero where single
 /// precision tells points apart as well as they need, else whole numbers near the bulk of the points.
 pub(crate) fn choose_origin(count: usize, at: &dyn Fn(usize) -> DVec3) -> DVec3 {
-    let Bulk { median, extent } = Bulk::of(count, at);
+    let Bulk { median, extent, .. } = Bulk::of(count, at);
     // Single precision has 24 bits: beyond four extents fewer than 22 are left for the extent itself.
     if median.abs().max_element() <= 4.0 * extent { DVec3::ZERO } else { median.round() }
 }

@@ -1,7 +1,8 @@
 //! How a long call tells where it is, and how its caller stops it.
 
 use crate::error::Error;
-use std::ops::ControlFlow;
+use crate::parallel;
+use std::ops::{ControlFlow, Range};
 
 type Observer<'a> = dyn Fn(&'static str, f64) -> ControlFlow<()> + 'a;
 
@@ -26,6 +27,11 @@ impl<'a> Progress<'a> {
         Progress { observer: &|_, _| ControlFlow::Continue(()), clock: &|| 0.0 }
     }
 
+    /// The part of the call that goes from `share.start` to `share.end` of the whole.
+    pub(crate) fn stage(&self, phase: &'static str, share: Range<f64>) -> Stage<'_> {
+        Stage { progress: self, phase, share }
+    }
+
     /// Tells the observer that `phase` stands at `fraction` of the whole call.
     pub(crate) fn update(&self, phase: &'static str, fraction: f64) -> Result<(), Error> {
         match (self.observer)(phase, fraction) {
@@ -36,5 +42,36 @@ impl<'a> Progress<'a> {
 
     pub(crate) fn milliseconds(&self) -> f64 {
         (self.clock)()
+    }
+}
+
+/// A part of a call, which tells of itself as a part of the whole.
+pub(crate) struct Stage<'a> {
+    progress: &'a Progress<'a>,
+    phase: &'static str,
+    share: Range<f64>,
+}
+
+impl Stage<'_> {
+    /// Runs the tasks in parallel and collects their answers in order. Between batches of tasks it tells the observer
+    /// and lets it stop the call: with tasks of some ten thousand points, every few milliseconds.
+    pub fn run<T: Send, R: Send>(&self, tasks: Vec<T>, work: impl Fn(T) -> R + Send + Sync) -> Result<Vec<R>, Error> {
+        let count = tasks.len();
+        let batch = 8 * parallel::threads();
+        let mut answers = Vec::with_capacity(count);
+        let mut tasks = tasks.into_iter();
+        while answers.len() < count {
+            let done = answers.len() as f64 / count as f64;
+            self.progress.update(self.phase, self.share.start + (self.share.end - self.share.start) * done)?;
+            answers.extend(parallel::map(tasks.by_ref().take(batch).collect(), &work));
+        }
+        self.progress.update(self.phase, self.share.end)?;
+        Ok(answers)
+    }
+
+    /// The part of this part that goes from `share.start` to `share.end` of it.
+    pub fn part(&self, share: Range<f64>) -> Stage<'_> {
+        let at = |x: f64| self.share.start + (self.share.end - self.share.start) * x;
+        Stage { progress: self.progress, phase: self.phase, share: at(share.start)..at(share.end) }
     }
 }

@@ -1,0 +1,165 @@
+//! Which blocks of 4x4x4 cubes ("bricks") hold points, in memory that grows with the points and not with the box.
+
+use crate::error::Error;
+use crate::lattice::Lattice;
+use crate::points::{CHUNK, Points, reserve};
+use crate::progress::Stage;
+use glam::{IVec3, Vec3};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+/// The occupied bricks, numbered from 0 in the order z, y, x.
+pub(crate) struct Bricks {
+    /// The place of each brick.
+    pub places: Vec<IVec3>,
+    index: Index,
+}
+
+/// From a place to the number of its brick.
+enum Index {
+    /// One bit for each brick of the box, and the number of bricks before each word of 64: 1.5 bits a brick.
+    Box { size: IVec3, bits: Vec<u64>, before: Vec<u32> },
+    /// For boxes that are nearly empty: an open-addressed table, its length a power of two.
+    Table { slots: Vec<u32> },
+}
+
+const FREE: u32 = u32::MAX;
+
+impl Bricks {
+    /// Finds the bricks of all points. One pass, parallel.
+    pub fn find(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<Self, Error> {
+        let size = lattice.bricks();
+        let volume = size.x as u128 * size.y as u128 * size.z as u128;
+        // At most 3 bytes a point. A surface with a few points in a cube needs a tenth of that.
+        let limit = (16 * points.len() as u128).clamp(1 << 20, 1 << 31);
+        if volume <= limit {
+            Self::in_box(points, lattice, size, stage)
+        } else {
+            Self::in_table(points, lattice, stage)
+        }
+    }
+
+    fn in_box(points: &Points, lattice: &Lattice, size: IVec3, stage: &Stage) -> Result<Self, Error> {
+        let count = (size.x as usize * size.y as usize * size.z as usize).div_ceil(64);
+        let mut bits: Vec<AtomicU64> = Vec::new();
+        reserve(&mut bits, count, "the grid")?;
+        bits.resize_with(count, AtomicU64::default);
+        stage.run(points.positions.chunks(CHUNK).collect(), |chunk: &[Vec3]| {
+            for &point in chunk {
+                if let Some((brick, _)) = lattice.locate(point) {
+                    let slot = slot(size, brick);
+                    let (word, bit) = (&bits[slot / 64], 1 << (slot % 64));
+                    // Reading first: most points find their bit set, and then no thread waits for another.
+                    if word.load(Relaxed) & bit == 0 {
+                        word.fetch_or(bit, Relaxed);
+                    }
+                }
+            }
+        })?;
+
+        let bits: Vec<u64> = bits.into_iter().map(AtomicU64::into_inner).collect();
+        let mut before = Vec::new();
+        reserve(&mut before, count, "the grid")?;
+        let mut total = 0;
+        for word in &bits {
+            before.push(total);
+            total += word.count_ones();
+        }
+        let mut places = Vec::new();
+        reserve(&mut places, total as usize, "the grid")?;
+        for (i, &word) in bits.iter().enumerate() {
+            places.extend(set_bits(word).map(|bit| place(size, 64 * i + bit as usize)));
+        }
+        Ok(Self { places, index: Index::Box { size, bits, before } })
+    }
+
+    fn in_table(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<Self, Error> {
+        let found = stage.run(points.positions.chunks(CHUNK).collect(), |chunk: &[Vec3]| {
+            let mut places: Vec<IVec3> = Vec::new();
+            for &point in chunk {
+                if let Some((brick, _)) = lattice.locate(point)
+                    && places.last() != Some(&brick)
+                {
+                    places.push(brick);
+                }
+            }
+            sort(&mut places);
+            places
+        })?;
+        let mut places = found.concat();
+        sort(&mut places);
+        places.shrink_to_fit();
+
+        let mut slots = Vec::new();
+        let length = (2 * places.len()).next_power_of_two();
+        reserve(&mut slots, length, "the grid")?;
+        slots.resize(length, FREE);
+        for (number, place) in places.iter().enumerate() {
+            let mut slot = hash(*place) & (length - 1);
+            while slots[slot] != FREE {
+                slot = (slot + 1) & (length - 1);
+            }
+            slots[slot] = number as u32;
+        }
+        Ok(Self { places, index: Index::Table { slots } })
+    }
+
+    /// How many bricks there are.
+    pub fn len(&self) -> usize {
+        self.places.len()
+    }
+
+    /// The number of the brick at a place, if it is occupied.
+    pub fn number(&self, brick: IVec3) -> Option<u32> {
+        match &self.index {
+            Index::Box { size, bits, before } => {
+                if brick.cmplt(IVec3::ZERO).any() || brick.cmpge(*size).any() {
+                    return None;
+                }
+                let slot = slot(*size, brick);
+                let (word, bit) = (bits[slot / 64], 1 << (slot % 64));
+                (word & bit != 0).then(|| before[slot / 64] + (word & (bit - 1)).count_ones())
+            }
+            Index::Table { slots } => {
+                let mut slot = hash(brick) & (slots.len() - 1);
+                loop {
+                    match slots[slot] {
+                        FREE => return None,
+                        number if self.places[number as usize] == brick => return Some(number),
+                        _ => slot = (slot + 1) & (slots.len() - 1),
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The positions of the bits that are set, lowest first.
+pub(crate) fn set_bits(mut bits: u64) -> impl Iterator<Item = u32> {
+    std::iter::from_fn(move || {
+        let bit = bits.trailing_zeros();
+        bits &= bits.wrapping_sub(1);
+        (bit < 64).then_some(bit)
+    })
+}
+
+/// The paper's key (Eq. 4), of a brick instead of a cube.
+fn slot(size: IVec3, brick: IVec3) -> usize {
+    (brick.z as usize * size.y as usize + brick.y as usize) * size.x as usize + brick.x as usize
+}
+
+fn place(size: IVec3, slot: usize) -> IVec3 {
+    let (row, x) = (slot / size.x as usize, slot % size.x as usize);
+    IVec3::new(x as i32, (row % size.y as usize) as i32, (row / size.y as usize) as i32)
+}
+
+fn sort(places: &mut Vec<IVec3>) {
+    places.sort_unstable_by_key(|p| (p.z, p.y, p.x));
+    places.dedup();
+}
+
+fn hash(brick: IVec3) -> usize {
+    let mixed = (brick.x as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+        ^ (brick.y as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F)
+        ^ (brick.z as u64).wrapping_mul(0x1656_67B1_9E37_79F9);
+    (mixed >> 32) as usize
+}

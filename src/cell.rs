@@ -1,0 +1,199 @@
+//! The edge of the cubes.
+
+use crate::error::Error;
+use crate::options::Cell;
+use crate::parallel;
+use crate::points::{Bounds, Bulk, CHUNK, Points};
+use glam::{DVec3, UVec3, Vec3};
+
+/// Points in an occupied cube that 'auto' aims at: with the 26 cubes round it some 36 points, as accurate on clean
+/// surfaces as 30 nearest neighbours.
+const POINTS_PER_CELL: f64 = 4.0;
+
+/// How many places 'auto' looks at.
+const PROBES: usize = 256;
+
+/// At these places 'auto' counts about this many points, or the 64th part of the cloud if that is more.
+const PROBED_POINTS: f64 = 32768.0;
+
+/// Halvings of a probe's edge that 'auto' counts.
+const LEVELS: u32 = 10;
+
+/// The paper's L (Eq. 1) for `count` points in a box with sides `extent`: the edge of as many cubes as points.
+///
+/// A side thinner than the cubes leaves a flat cloud, where the same formula in the plane holds, or on the line. Each
+/// of the three passes into the next where the side equals the edge, so the largest is the one that applies. All
+/// points equal: 1.
+pub(crate) fn paper_edge(extent: DVec3, count: usize) -> f64 {
+    let n = count.max(1) as f64;
+    let mut sides = extent.to_array();
+    sides.sort_unstable_by(f64::total_cmp);
+    let [thin, middle, long] = sides;
+    // Shares of the longest side, so that nothing over- or underflows.
+    let (thin, middle) = (thin / long, middle / long);
+    let edge = long * (thin * middle / n).cbrt().max((middle / n).sqrt()).max(1.0 / n);
+    if edge > 0.0 && edge.is_finite() { edge } else { 1.0 }
+}
+
+/// The edge that `cell` asks for, in units of the positions.
+pub(crate) fn edge(cell: Cell, points: &Points, bounds: &Bounds) -> Result<f64, Error> {
+    match cell {
+        Cell::Scale(scale) => Ok(scale * paper_edge(bounds.extent(), bounds.finite)),
+        Cell::Size(size) => Ok(size / points.unit),
+        Cell::Auto => Ok(populated_edge(points, bounds)),
+    }
+}
+
+/// The edge that puts [`POINTS_PER_CELL`] points into an occupied cube.
+///
+/// The mean of 1 / (points in the cube of a point), taken over all points, is the share of occupied cubes in points.
+/// So a few points chosen at random ("probes") tell it without bias, whatever the extent of the cloud: the cubes round
+/// them are halved until they hold too few points. Stray points weigh as little as they are few.
+/// Costs one pass over the points.
+fn populated_edge(points: &Points, bounds: &Bounds) -> f64 {
+    let at = |i: usize| points.positions[i].as_dvec3();
+    let bulk = Bulk::of(points.len(), &at);
+    let extent = if bulk.extent > 0.0 { bulk.extent } else { bounds.extent().max_element() };
+    if extent <= 0.0 {
+        return 1.0;
+    }
+    let probes = Probes::place(&bulk, extent, bounds.finite);
+    let counts = probes.count(points);
+    // Points that coincide can't be told apart by any edge, so they count as one.
+    let target = POINTS_PER_CELL * counts[LEVELS as usize];
+    let Some(level) = counts.iter().position(|&count| count < target) else {
+        return probes.edge;
+    };
+    if level == 0 {
+        // A probe is too small already. On a surface the points of a cube grow with its edge squared.
+        return probes.edge * (target / counts[0]).sqrt();
+    }
+    let (coarse, fine) = (counts[level - 1], counts[level]);
+    let share = (coarse / target).ln() / (coarse / fine).ln();
+    probes.edge * (-(level as f64 - 1.0 + share)).exp2()
+}
+
+/// Cubes of one grid that hold a chosen point each, with the number of chosen points in them.
+struct Probes {
+    origin: DVec3,
+    edge: f64,
+    /// Sorted by cube.
+    chosen: Vec<([i64; 3], u32)>,
+    /// A bit for each of 2^16 hashes of a cube: turns most points away at once.
+    filter: Vec<u64>,
+}
+
+impl Probes {
+    /// Halves the edge until the probes hold no more of the cloud than wanted.
+    fn place(bulk: &Bulk, extent: f64, count: usize) -> Self {
+        let mut sample = bulk.sample.clone();
+        sample.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
+        sample.dedup();
+        let wanted = (PROBED_POINTS / count as f64).max(1.0 / 64.0);
+        let step = sample.len().div_ceil(PROBES).max(1);
+        let mut probes = Self { origin: bulk.median, edge: extent, chosen: Vec::new(), filter: vec![0; 1024] };
+        for halvings in 0..64 {
+            probes.edge = extent * (-f64::from(halvings)).exp2();
+            let mut cubes: Vec<[i64; 3]> = sample.iter().step_by(step).map(|p| probes.cube(*p).0).collect();
+            cubes.sort_unstable();
+            probes.chosen = cubes.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as u32)).collect();
+            let is_inside = |point: &DVec3| probes.search(probes.cube(*point).0).is_some();
+            let others = sample.iter().enumerate().filter(|(i, point)| i % step != 0 && is_inside(point)).count();
+            if others as f64 <= wanted * sample.len() as f64 {
+                break;
+            }
+        }
+        for (cube, _) in &probes.chosen {
+            let bit = hash(*cube);
+            probes.filter[bit / 64] |= 1 << (bit % 64);
+        }
+        probes
+    }
+
+    /// The cube of a point, and where in the cube the point lies, in 0 to 1.
+    fn cube(&self, point: DVec3) -> ([i64; 3], DVec3) {
+        let place = (point - self.origin) / self.edge;
+        let floor = place.floor();
+        (floor.as_i64vec3().to_array(), place - floor)
+    }
+
+    /// The number of the probe at a cube.
+    fn find(&self, cube: [i64; 3]) -> Option<u32> {
+        let bit = hash(cube);
+        if self.filter[bit / 64] >> (bit % 64) & 1 == 1 { self.search(cube) } else { None }
+    }
+
+    fn search(&self, cube: [i64; 3]) -> Option<u32> {
+        self.chosen.binary_search_by_key(&cube, |(cube, _)| *cube).ok().map(|probe| probe as u32)
+    }
+
+    /// Points in an occupied cube for the probes' edge halved 0 to [`LEVELS`] times.
+    fn count(&self, points: &Points) -> Vec<f64> {
+        // The probe of each point, then a Morton code: points in one cube of any level share the first bits.
+        let tasks: Vec<&[Vec3]> = points.positions.chunks(CHUNK).collect();
+        let mut found: Vec<u64> = parallel::map(tasks, |chunk| {
+            let cubes = chunk.iter().filter(|p| p.is_finite()).map(|p| self.cube(p.as_dvec3()));
+            cubes
+                .filter_map(|(cube, place)| Some((self.find(cube)?, place)))
+                .map(|(probe, place)| {
+                    u64::from(probe) << (3 * LEVELS) | u64::from(morton((place * f64::from(1 << LEVELS)).as_uvec3()))
+                })
+                .collect::<Vec<_>>()
+        })
+        .concat();
+        found.sort_unstable();
+
+        let mut share = vec![0.0; LEVELS as usize + 1];
+        let mut chosen = 0.0;
+        for probe in found.chunk_by(|a, b| a >> (3 * LEVELS) == b >> (3 * LEVELS)) {
+            let weight = f64::from(self.chosen[(probe[0] >> (3 * LEVELS)) as usize].1);
+            chosen += weight;
+            for (level, share) in share.iter_mut().enumerate() {
+                let shift = 3 * (LEVELS - level as u32);
+                let occupied = probe.chunk_by(|a, b| a >> shift == b >> shift).count();
+                *share += weight * occupied as f64 / probe.len() as f64;
+            }
+        }
+        share.into_iter().map(|share| chosen / share).collect()
+    }
+}
+
+fn hash(cube: [i64; 3]) -> usize {
+    let [x, y, z] = cube.map(|c| c as u64);
+    let mixed = x.wrapping_mul(0x9E37_79B9_7F4A_7C15)
+        ^ y.wrapping_mul(0xC2B2_AE3D_27D4_EB4F)
+        ^ z.wrapping_mul(0x1656_67B1_9E37_79F9);
+    (mixed >> 48) as usize
+}
+
+/// Interleaves the lowest [`LEVELS`] bits of three numbers.
+fn morton(place: UVec3) -> u32 {
+    let spread = |value: u32| (0..LEVELS).map(|bit| (value >> bit & 1) << (3 * bit)).sum::<u32>();
+    let place = place.min(UVec3::splat((1 << LEVELS) - 1));
+    spread(place.x) | spread(place.y) << 1 | spread(place.z) << 2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paper_edge_is_equation_1() {
+        assert_eq!(paper_edge(DVec3::new(2.0, 2.0, 2.0), 1000), 0.2);
+        assert!((paper_edge(DVec3::new(10.0, 1.0, 0.1), 1_000_000) - 0.01).abs() < 1e-12);
+    }
+
+    #[test]
+    fn paper_edge_of_flat_straight_and_single_clouds() {
+        assert!((paper_edge(DVec3::new(4.0, 0.0, 1.0), 100) - 0.2).abs() < 1e-12);
+        assert!((paper_edge(DVec3::new(0.0, 5.0, 0.0), 100) - 0.05).abs() < 1e-12);
+        assert_eq!(paper_edge(DVec3::ZERO, 100), 1.0);
+    }
+
+    #[test]
+    fn morton_codes_share_their_first_bits_within_a_cube() {
+        assert_eq!(morton(UVec3::new(1, 0, 0)), 1);
+        assert_eq!(morton(UVec3::new(0, 3, 0)), 0b010_010);
+        assert_eq!(morton(UVec3::splat(1 << LEVELS)), (1 << (3 * LEVELS)) - 1);
+    }
+}

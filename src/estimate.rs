@@ -1,0 +1,120 @@
+//! The pipeline: the only file that knows all stages.
+
+use crate::cell;
+use crate::error::Error;
+use crate::grid::Grid;
+use crate::lattice::Lattice;
+use crate::nodes::{self, Node};
+use crate::normals;
+use crate::options::Options;
+use crate::points::{Bounds, Bulk, Points};
+use crate::progress::Progress;
+
+/// The normals of a cloud, and how they were found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// `nx0 ny0 nz0 nx1 ...`, one unit vector a point in the order of the input, or zero for an unresolved point.
+    pub normals: Vec<f32>,
+    /// What was done.
+    pub report: Report,
+}
+
+/// What an estimate did.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Report {
+    /// Points of the input.
+    pub points: u64,
+    /// Points that got the zero vector: not finite, or without neighbours that determine a plane.
+    pub unresolved: u64,
+    /// Cubes that hold points.
+    pub cells: u64,
+    /// Cubes that hold their node.
+    pub nodes: u64,
+    /// Cubes along each axis of the bounding box.
+    pub grid: [u64; 3],
+    /// Edge of a cube, in units of the input.
+    pub cell_size: f64,
+    /// Edge of a cube, in multiples of the paper's L (Eq. 1).
+    pub scale: f64,
+    /// Points interpolated from 0, 1, 2, 3 and 4 nodes. Those from 0 took the nearest node or their own plane.
+    pub nodes_used: [u64; 5],
+    /// Phases in their order, and what each took by the clock of the [`Progress`].
+    pub milliseconds: Vec<(&'static str, f64)>,
+}
+
+/// Estimates the normals of a cloud.
+///
+/// Output length equals input length; a point that is not finite, or that has no neighbours to tell a plane from, gets
+/// the zero vector and influences no other. The result is the same to the bit for any number of threads.
+///
+/// Linear in the number of points. Takes up to 44 bytes a point beyond the input, plus 60 bytes for each occupied cube.
+///
+/// # Errors
+/// [`Error::Input`] and [`Error::Unsupported`] for the options, [`Error::Limit`] when memory does not suffice,
+/// [`Error::Cancelled`] when `progress` asked for it.
+pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Result<Estimate, Error> {
+    options.validate()?;
+    // Places and counts are 32-bit numbers.
+    if points.len() >= u32::MAX as usize {
+        return Err(Error::Limit {
+            message: format!("the cloud has {} points; at most {} fit", points.len(), u32::MAX - 1),
+            needed: points.len() as u64,
+            available: Some(u64::from(u32::MAX - 1)),
+        });
+    }
+    let mut laps = Laps::start(progress);
+
+    progress.update("bounds", 0.0)?;
+    let bounds = Bounds::of(points);
+    laps.end("bounds");
+
+    progress.update("cellSize", 0.03)?;
+    let edge = cell::edge(options.cell, points, &bounds)?;
+    let centre = Bulk::of(points.len(), &|i| points.positions[i].as_dvec3()).median;
+    let lattice = Lattice::new(bounds.min.as_dvec3(), bounds.max.as_dvec3(), centre, edge);
+    laps.end("cellSize");
+
+    let grid = Grid::sort(points, &lattice, &progress.stage("sort", 0.06..0.45))?;
+    laps.end("sort");
+    let moments = grid.moments(&progress.stage("sums", 0.45..0.55))?;
+    laps.end("sums");
+    let nodes = nodes::nodes(&grid, &moments, &progress.stage("nodes", 0.55..0.65))?;
+    drop(moments);
+    laps.end("nodes");
+    let stage = progress.stage("interpolation", 0.65..1.0);
+    let result = normals::interpolate(&grid, &nodes, points.len(), &stage)?;
+    laps.end("interpolation");
+
+    let paper_edge = cell::paper_edge(bounds.extent(), bounds.finite);
+    let report = Report {
+        points: points.len() as u64,
+        unresolved: result.unresolved,
+        cells: grid.cubes() as u64,
+        nodes: nodes.iter().filter(|node| Node::is_good(node)).count() as u64,
+        grid: ((bounds.extent() / edge).floor() + 1.0).as_u64vec3().to_array(),
+        cell_size: edge * points.unit,
+        scale: edge / paper_edge,
+        nodes_used: result.nodes_used,
+        milliseconds: laps.ended,
+    };
+    Ok(Estimate { normals: result.normals, report })
+}
+
+/// A stop-watch that notes a time for each phase.
+struct Laps<'a> {
+    progress: &'a Progress<'a>,
+    since: f64,
+    ended: Vec<(&'static str, f64)>,
+}
+
+impl<'a> Laps<'a> {
+    fn start(progress: &'a Progress<'a>) -> Self {
+        Self { progress, since: progress.milliseconds(), ended: Vec::new() }
+    }
+
+    fn end(&mut self, phase: &'static str) {
+        let now = self.progress.milliseconds();
+        self.ended.push((phase, now - self.since));
+        self.since = now;
+    }
+}

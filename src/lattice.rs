@@ -1,0 +1,69 @@
+//! From a position to its cube, and back.
+
+use glam::{DVec3, IVec3, UVec3, Vec3};
+
+/// Cubes along the edge of a brick.
+pub(crate) const BRICK: i32 = 4;
+
+/// Cubes along an axis at the most: places must fit 32-bit numbers.
+const CUBES: f64 = (1 << 30) as f64;
+
+/// An endless grid of cubes, grouped in bricks of 4x4x4.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lattice {
+    /// The lowest corner.
+    base: DVec3,
+    /// 1 / edge.
+    scale: f64,
+    /// Cubes along each axis.
+    size: DVec3,
+}
+
+impl Lattice {
+    /// A grid from `min` to `max`. Where that is more than 2^30 cubes along an axis, 2^29 on either side of `centre`:
+    /// points beyond are out of reach.
+    pub fn new(min: DVec3, max: DVec3, centre: DVec3, edge: f64) -> Self {
+        let base = min.max(centre - CUBES / 2.0 * edge);
+        let scale = 1.0 / edge;
+        // The same product as in `locate`, so that the point on the maximum falls into the last cube.
+        let size = (((max - base) * scale).floor() + 1.0).clamp(DVec3::ONE, DVec3::splat(CUBES));
+        Self { base, scale, size }
+    }
+
+    /// Bricks along each axis.
+    pub fn bricks(&self) -> IVec3 {
+        (self.size / f64::from(BRICK)).ceil().as_ivec3()
+    }
+
+    /// The brick of a point, and the point's place in it, in edges, from 0 up to but not including 4 (paper, Eq. 3).
+    /// `None` for a point that is not finite or out of reach.
+    ///
+    /// In double precision, so that a long thin cloud or a stray point far away costs no accuracy. Whatever cube the
+    /// place says is the cube of the point: nothing computes it a second way.
+    #[inline]
+    pub fn locate(&self, point: Vec3) -> Option<(IVec3, Vec3)> {
+        let place = (point.as_dvec3() - self.base) * self.scale;
+        if !(place.cmpge(DVec3::ZERO) & place.cmplt(self.size)).all() {
+            return None;
+        }
+        let brick = (place * (1.0 / f64::from(BRICK))).as_ivec3();
+        let local = (place - brick.as_dvec3() * f64::from(BRICK)).as_vec3();
+        Some((brick, local.min(Vec3::splat(BELOW_BRICK))))
+    }
+}
+
+/// The largest number below 4.
+const BELOW_BRICK: f32 = (BRICK as f32).next_down();
+
+/// The cube of a place in a brick: `x + 4 y + 16 z`.
+#[inline]
+pub(crate) fn cube_in_brick(local: Vec3) -> u32 {
+    let cube = local.as_uvec3();
+    cube.x + 4 * cube.y + 16 * cube.z
+}
+
+/// The centre of the cube with bit `bit`, in the brick.
+#[inline]
+pub(crate) fn cube_centre(bit: u32) -> Vec3 {
+    UVec3::new(bit & 3, bit >> 2 & 3, bit >> 4).as_vec3() + 0.5
+}

@@ -1,0 +1,140 @@
+//! One neighbourhood: its moments, their shift by whole cubes, and the plane that fits it best.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, IVec3, Vec3};
+
+/// A neighbourhood whose second eigenvalue is below this (in square edges, and against the first) lies on one line
+/// or in one point: 1e-6 is three times the rounding of single-precision moments, a thousandth of an edge in length.
+const LINE: f64 = 1e-6;
+
+/// Ten sums over the points of a cube, relative to its centre and in units of its edge.
+///
+/// Single precision is enough: the coordinates stay within 1.5 even after a shift, so the covariance is off by some
+/// 1e-7 square edges, and the normal by some 1e-6 radians.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Moments {
+    pub count: f32,
+    pub sum: Vec3,
+    /// Sums of xx, yy, zz.
+    pub squares: Vec3,
+    /// Sums of yz, xz, xy.
+    pub products: Vec3,
+}
+
+impl Moments {
+    /// The sums of some points. Adds in double precision, so that a cube may hold any number of points.
+    pub fn of(points: impl Iterator<Item = Vec3>) -> Self {
+        let (mut count, mut sum) = (0.0, DVec3::ZERO);
+        let (mut squares, mut products) = (DVec3::ZERO, DVec3::ZERO);
+        for point in points {
+            let p = point.as_dvec3();
+            count += 1.0;
+            sum += p;
+            squares += p * p;
+            products += DVec3::new(p.y * p.z, p.x * p.z, p.x * p.y);
+        }
+        Self { count, sum: sum.as_vec3(), squares: squares.as_vec3(), products: products.as_vec3() }
+    }
+
+    /// Adds the sums of the cube that lies `step` cubes away, shifted into this cube's coordinates.
+    pub fn add_shifted(&mut self, other: &Self, step: IVec3) {
+        let Self { count: n, sum: s, squares, products } = *other;
+        let d = step.as_vec3();
+        self.count += n;
+        self.sum += s + n * d;
+        self.squares += squares + d * (2.0 * s + n * d);
+        self.products += products
+            + Vec3::new(
+                d.y * s.z + d.z * s.y + n * d.y * d.z,
+                d.x * s.z + d.z * s.x + n * d.x * d.z,
+                d.x * s.y + d.y * s.x + n * d.x * d.y,
+            );
+    }
+
+    /// The centroid (paper, Eq. 5) and the unit normal of the plane through it (Eq. 6); `None` for fewer than three
+    /// points, and for points on one line.
+    ///
+    /// The sign of the normal is arbitrary but the same for the same sums.
+    pub fn plane(&self) -> Option<(Vec3, Vec3)> {
+        if self.count < 3.0 {
+            return None;
+        }
+        let n = f64::from(self.count);
+        let mean = self.sum.as_dvec3() / n;
+        let diagonal = self.squares.as_dvec3() / n - mean * mean;
+        let off = self.products.as_dvec3() / n - DVec3::new(mean.y * mean.z, mean.x * mean.z, mean.x * mean.y);
+        let normal = Symmetric { diagonal, off }.normal()?;
+        Some((mean.as_vec3(), normal.as_vec3()))
+    }
+}
+
+/// A symmetric 3x3 matrix, positive semidefinite up to rounding.
+struct Symmetric {
+    /// xx, yy, zz.
+    diagonal: DVec3,
+    /// yz, xz, xy.
+    off: DVec3,
+}
+
+impl Symmetric {
+    /// The unit eigenvector of the smallest eigenvalue, unless the second eigenvalue vanishes too.
+    ///
+    /// The rows of `A - lambda3` span the plane across the wanted vector, so it is the cross product of two of them:
+    /// the longest of the three products, which is never short while the second eigenvalue stands apart.
+    fn normal(&self) -> Option<DVec3> {
+        let trace = self.diagonal.element_sum();
+        let smallest = self.smallest_eigenvalue();
+        // lambda1 + lambda2 and lambda1 * lambda2, and from them a lower bound of lambda2 = product / lambda1.
+        let sum = trace - smallest;
+        let product = (self.minors() - smallest * sum).max(0.0);
+        if product <= LINE * sum * sum.max(1.0) {
+            return None;
+        }
+        let (d, o) = (self.diagonal - smallest, self.off);
+        let rows = [DVec3::new(d.x, o.z, o.y), DVec3::new(o.z, d.y, o.x), DVec3::new(o.y, o.x, d.z)];
+        let crosses = [rows[0].cross(rows[1]), rows[1].cross(rows[2]), rows[2].cross(rows[0])];
+        let mut longest = crosses[0];
+        for cross in &crosses[1..] {
+            if cross.length_squared() > longest.length_squared() {
+                longest = *cross;
+            }
+        }
+        // Isotropic: every direction is an eigenvector, and A - lambda3 has no rows left.
+        Some(longest.try_normalize().unwrap_or(DVec3::Z))
+    }
+
+    /// The sum of the principal 2x2 minors.
+    fn minors(&self) -> f64 {
+        let (d, o) = (self.diagonal, self.off);
+        d.y * d.z - o.x * o.x + d.x * d.z - o.y * o.y + d.x * d.y - o.z * o.z
+    }
+
+    fn determinant(&self) -> f64 {
+        let (d, o) = (self.diagonal, self.off);
+        d.x * (d.y * d.z - o.x * o.x) - o.z * (o.z * d.z - o.x * o.y) + o.y * (o.z * o.x - d.y * o.y)
+    }
+
+    /// The smallest root of the characteristic polynomial, by Newton's method from zero.
+    ///
+    /// Left of its smallest root a cubic with three real roots is monotone and bends one way, so the steps rise
+    /// towards the root and never pass it. Planar neighbourhoods take two or three; the bound serves nearly isotropic
+    /// ones, whose normal means little. No trigonometry: the same bits on every platform.
+    fn smallest_eigenvalue(&self) -> f64 {
+        let (trace, minors, determinant) = (self.diagonal.element_sum(), self.minors(), self.determinant());
+        let mut root = 0.0;
+        for _ in 0..24 {
+            let value = ((trace - root) * root - minors) * root + determinant;
+            let slope = (2.0 * trace - 3.0 * root) * root - minors;
+            if value <= 0.0 || slope >= 0.0 {
+                break;
+            }
+            let step = value / -slope;
+            root += step;
+            if step <= 1e-13 * trace {
+                break;
+            }
+        }
+        root
+    }
+}
