@@ -26,12 +26,13 @@ const JAVASCRIPT_LIMIT = 8;
 
 /** Builds what has changed, and checks the sizes. */
 export function build() {
-  const wasmSources = [...filesIn('src', '.rs'), ...filesIn('scripts'), 'Cargo.toml', 'Cargo.lock', 'rust-toolchain.toml'];
+  const flags = ['scripts/build.mjs', 'scripts/single.toml', 'scripts/threads.toml'];
+  const wasmSources = [...filesIn('src', '.rs'), ...flags, 'Cargo.toml', 'Cargo.lock', 'rust-toolchain.toml'];
   for (const name of Object.keys(WASM)) {
     once(`dist/${name} by wasm-pack`, wasmSources, [`dist/${name}/bilinormal_bg.wasm`], () => buildWasm(name));
   }
-  const scriptSources = [...filesIn('src/js'), ...filesIn('scripts'), 'tsconfig.json', 'package.json'];
-  once('dist/*.js by tsc and esbuild', [...scriptSources, ...wasmSources], ['dist/index.js'], buildJavaScript);
+  const scriptSources = [...filesIn('src/js'), 'tsconfig.json', ...wasmSources];
+  once('dist/*.js by tsc and esbuild', scriptSources, ['dist/index.js'], buildJavaScript);
   checkSizes();
 }
 

@@ -32,13 +32,13 @@ impl Buffer {
             let message = format!("byteLength is {byte_length}; wanted a whole number of at least 0");
             return Err(Error::Input(message).into());
         }
-        let needed = byte_length as u64;
-        let Ok(byte_length) = usize::try_from(needed) else {
-            return Err(Error::memory("the data", needed).into());
+        let too_large = Error::memory("the data", byte_length as u64);
+        let Some(words) = u32::try_from(byte_length as u64).ok().map(|bytes| bytes.div_ceil(4) as usize) else {
+            return Err(too_large.into());
         };
-        let words = byte_length.div_ceil(size_of::<f32>());
+        let byte_length = byte_length as usize;
         let mut floats = Vec::new();
-        reserve(&mut floats, words, "the data")?;
+        floats.try_reserve_exact(words).map_err(|_| too_large)?;
         floats.resize(words, 0.0);
         Ok(Self { storage: Storage::Floats(floats), byte_length })
     }
