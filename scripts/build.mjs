@@ -5,6 +5,7 @@ import { createHash } from 'node:crypto';
 import { existsSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { dirname, join, relative } from 'node:path';
 import { gzipSync } from 'node:zlib';
+import { shortenGlue } from './glue.mjs';
 import { Failure, main, root, run, started, tell } from './run.mjs';
 import { setup } from './setup.mjs';
 
@@ -26,7 +27,7 @@ const JAVASCRIPT_LIMIT = 8;
 
 /** Builds what has changed, and checks the sizes. */
 export function build() {
-  const flags = ['scripts/build.mjs', 'scripts/single.toml', 'scripts/threads.toml'];
+  const flags = ['scripts/build.mjs', 'scripts/glue.mjs', 'scripts/single.toml', 'scripts/threads.toml'];
   const wasmSources = [...filesIn('src', '.rs'), ...flags, 'Cargo.toml', 'Cargo.lock', 'rust-toolchain.toml'];
   for (const name of Object.keys(WASM)) {
     once(`dist/${name} by wasm-pack`, wasmSources, [`dist/${name}/bilinormal_bg.wasm`], () => buildWasm(name));
@@ -72,6 +73,7 @@ function buildWasm(name) {
   const glue = join(folder, 'bilinormal.js');
   writeFileSync(glue, finish(readFileSync(glue, 'utf8')));
   rmSync(join(folder, 'snippets'), { recursive: true, force: true });
+  shortenGlue(`dist/${name}`);
   esbuild([`dist/${name}/bilinormal.js`, `--outfile=dist/${name}/bilinormal.js`, '--allow-overwrite']);
 }
 
