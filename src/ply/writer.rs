@@ -32,7 +32,9 @@ pub fn write(file: &[u8], add: &Additions, ascii: bool, progress: &Progress) -> 
     add.check(vertex.count)?;
     let plan = Plan::new(vertex, add);
     let body = Body::locate(&header, file)?;
-    let total = header.elements.iter().fold(0, |sum: u64, element| sum.saturating_add(element.count));
+    // Without properties there is nothing to write, however many rows there are.
+    let filled = || header.elements.iter().enumerate().filter(|(_, element)| !element.properties.is_empty());
+    let total = filled().map(|(_, element)| element.count).sum();
     let mut meter = Meter { progress, phase: "write", done: 0, total };
     let mut sink = Sink::new(header_text(&header, index, &plan, ascii)?, ascii);
     if let (Body::Binary(extents), false) = (&body, ascii) {
@@ -40,7 +42,7 @@ pub fn write(file: &[u8], add: &Additions, ascii: bool, progress: &Progress) -> 
         let body: usize = extents.iter().map(|extent| extent.len()).sum();
         sink.make_room(body.saturating_add(plan.added_bytes().saturating_mul(vertex.count as usize)))?;
     }
-    for (number, element) in header.elements.iter().enumerate() {
+    for (number, element) in filled() {
         let element_plan = if number == index { &plan } else { &Plan::copy(element) };
         match &body {
             Body::Binary(extents) => {
@@ -51,8 +53,6 @@ pub fn write(file: &[u8], add: &Additions, ascii: bool, progress: &Progress) -> 
                         sink.append(rows)?;
                         meter.add(element.count as usize)?;
                     }
-                    // Without properties there is nothing to write, however many rows there are.
-                    Some(0) => {}
                     Some(stride) if little_to_little => {
                         copy_fixed(rows, stride, vertex, &plan, add, &mut sink, &mut meter)?;
                     }

@@ -67,8 +67,9 @@ impl Ply {
         }
         let mut rows = file[at..].split(|b| *b == line_end).filter(|row| !row.trim_ascii().is_empty());
         for element in &mut elements {
-            for _ in 0..element.count {
-                let mut tokens: VecDeque<String> = if text && !element.properties.is_empty() {
+            let rows_there = if element.properties.is_empty() { 0 } else { element.count };
+            for _ in 0..rows_there {
+                let mut tokens: VecDeque<String> = if text {
                     let row = String::from_utf8_lossy(rows.next().expect("a row")).into_owned();
                     row.split_whitespace().map(str::to_owned).collect()
                 } else {
