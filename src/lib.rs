@@ -24,7 +24,7 @@ pub mod ply;
 mod points;
 mod progress;
 #[cfg(target_arch = "wasm32")]
-mod wasm;
+pub mod wasm;
 
 pub use error::{Error, Place};
 pub use estimate::{Estimate, Report, estimate};

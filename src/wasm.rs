@@ -1,1 +1,50 @@
-//! The border to JavaScript.
+//! The border to JavaScript: typed arrays in, typed arrays out, and the only place that knows `wasm_bindgen`.
+//!
+//! Nothing is decided here. Each function reads its arguments, calls the crate, and hands the result over; whatever
+//! goes wrong is thrown as an `Error` with a `code`. Stopping a call is not the border's business either: the caller
+//! ends the worker that runs it.
+
+mod buffer;
+mod error;
+mod estimate;
+mod memory;
+mod options;
+mod ply;
+
+pub use buffer::Buffer;
+pub use estimate::{Estimation, estimate};
+pub use ply::{Cloud, read_ply, write_cloud, write_ply};
+#[cfg(feature = "threads")]
+pub use wasm_bindgen_rayon::init_thread_pool;
+
+use crate::error::Error;
+use crate::progress::Progress;
+use js_sys::{Function, Object, Reflect};
+use std::ops::ControlFlow;
+use wasm_bindgen::prelude::*;
+use web_sys::WorkerGlobalScope;
+
+#[cfg(all(feature = "threads", not(target_feature = "atomics")))]
+compile_error!("feature `threads` needs atomics, in the standard library too: scripts/build.mjs has the flags");
+
+/// Runs `work` with a progress that goes to `tell(phase, fraction)`, and measures its memory.
+fn call<T>(tell: &Function, work: impl FnOnce(&Progress) -> Result<T, Error>) -> Result<T, JsValue> {
+    memory::begin();
+    let observer = |phase: &'static str, fraction: f64| {
+        // What the listener throws is its own affair.
+        let _ = tell.call2(&JsValue::UNDEFINED, &phase.into(), &fraction.into());
+        ControlFlow::Continue(())
+    };
+    Ok(work(&Progress::new(&observer, &now))?)
+}
+
+/// Milliseconds. Workers of browsers and of Node both have the global `performance`.
+fn now() -> f64 {
+    let scope: WorkerGlobalScope = js_sys::global().unchecked_into();
+    scope.performance().map_or(0.0, |performance| performance.now())
+}
+
+/// Sets a property of an object that this module has just made, which cannot fail.
+fn set(object: &Object, name: &str, value: impl Into<JsValue>) {
+    let _ = Reflect::set(object, &name.into(), &value.into());
+}

@@ -1,0 +1,141 @@
+// Builds dist/: both wasm packages by wasm-pack, then the JavaScript by the TypeScript compiler and esbuild.
+// All flags of the builds are here, in single.toml and threads.toml beside this file, and in Cargo.toml.
+
+import { createHash } from 'node:crypto';
+import { existsSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
+import { dirname, join, relative } from 'node:path';
+import { gzipSync } from 'node:zlib';
+import { Failure, main, root, run, started, tell } from './run.mjs';
+import { setup } from './setup.mjs';
+
+/** The wasm builds: what cargo is told, what happens to the glue, and the gzipped size allowed in KiB. */
+const WASM = {
+  single: {
+    cargo: ['--no-default-features', '--config', 'scripts/single.toml'],
+    finish: (glue) => glue,
+    limit: 60,
+  },
+  threads: {
+    // A target directory of its own, because it holds a standard library of its own.
+    cargo: ['--features', 'threads', '--config', 'scripts/threads.toml', '--target-dir', 'target/threads'],
+    finish: withOwnPool,
+    limit: 100,
+  },
+};
+const JAVASCRIPT_LIMIT = 8;
+
+/** Builds what has changed, and checks the sizes. */
+export function build() {
+  const flags = ['scripts/build.mjs', 'scripts/single.toml', 'scripts/threads.toml'];
+  const wasmSources = [...filesIn('src', '.rs'), ...flags, 'Cargo.toml', 'Cargo.lock', 'rust-toolchain.toml'];
+  for (const name of Object.keys(WASM)) {
+    once(`dist/${name} by wasm-pack`, wasmSources, [`dist/${name}/bilinormal_bg.wasm`], () => buildWasm(name));
+  }
+  const scriptSources = [...filesIn('src/js'), 'tsconfig.json', ...wasmSources];
+  once('dist/*.js by tsc and esbuild', scriptSources, ['dist/index.js'], buildJavaScript);
+  checkSizes();
+}
+
+/** Builds the page into www/dist. */
+export function buildPage() {
+  tell('build: www/dist by Vite');
+  run('vite', ['build', 'www', '--logLevel', 'warn']);
+}
+
+/**
+ * Does a job unless it was done with the same input files. As a whole, because wasm-opt and the linker begin anew each
+ * time; what has changed is left to cargo.
+ */
+function once(what, inputs, outputs, job) {
+  const hash = createHash('sha256');
+  for (const path of [...inputs, 'package-lock.json']) {
+    hash.update(`${path}\0`).update(readFileSync(join(root, path))).update('\0');
+  }
+  const digest = hash.digest('hex');
+  const stamp = join(root, 'target', 'built', what.replace(/\W+/g, '-'));
+  const done = existsSync(stamp) && readFileSync(stamp, 'utf8') === digest;
+  if (done && outputs.every((path) => existsSync(join(root, path)))) return;
+  tell(`build: ${what}, because its sources are new or changed`);
+  rmSync(stamp, { force: true });
+  job();
+  mkdirSync(dirname(stamp), { recursive: true });
+  writeFileSync(stamp, digest);
+}
+
+function buildWasm(name) {
+  const { cargo, finish } = WASM[name];
+  const folder = join(root, 'dist', name);
+  rmSync(folder, { recursive: true, force: true });
+  // The npm package has one package.json, readme and licence of its own: none from wasm-pack.
+  const output = ['--out-dir', `dist/${name}`, '--out-name', 'bilinormal', '--no-pack', '--no-gitignore'];
+  run('wasm-pack', ['build', '.', '--mode', 'no-install', '--target', 'web', '--release', ...output, '--', ...cargo]);
+  const glue = join(folder, 'bilinormal.js');
+  writeFileSync(glue, finish(readFileSync(glue, 'utf8')));
+  rmSync(join(folder, 'snippets'), { recursive: true, force: true });
+  minify([glue]);
+}
+
+/**
+ * Lets the threads build start its pool by `src/js/pool.ts` instead of the helper of wasm-bindgen-rayon, which imports
+ * a folder (only bundlers resolve that), knows no Node, and waits for ever when a worker fails to load.
+ */
+function withOwnPool(glue) {
+  const helper = /(import \{ startWorkers \} from )'\.\/snippets\/wasm-bindgen-rayon-[^']*\/workerHelpers\.js'/;
+  if (!helper.test(glue)) throw new Failure('dist/threads/bilinormal.js: no import of startWorkers to point at pool.js');
+  return glue.replace(helper, "$1'../pool.js'");
+}
+
+function buildJavaScript() {
+  const compiled = () => filesIn('dist', '.js').filter((path) => dirname(path) === 'dist');
+  // What an older source left behind must not enter the package.
+  for (const path of compiled()) rmSync(join(root, path));
+  run('tsc', ['--project', '.']);
+  minify(compiled().map((path) => join(root, path)));
+}
+
+/** File by file, without bundling: a bundler or browser must still see `new URL('./worker.js', import.meta.url)`. */
+function minify(files) {
+  const output = [`--outdir=${root}`, `--outbase=${root}`, '--allow-overwrite', '--log-level=warning'];
+  run('esbuild', [...files, '--minify', '--format=esm', '--target=es2022', ...output]);
+}
+
+function checkSizes() {
+  const sizes = Object.keys(WASM).map((name) => [`${name} wasm`, [`dist/${name}/bilinormal_bg.wasm`], WASM[name].limit]);
+  sizes.push(['JavaScript', downloadedJavaScript(), JAVASCRIPT_LIMIT]);
+  for (const [what, files, limit] of sizes) {
+    const bytes = files.map((file) => gzipSync(readFileSync(join(root, file)), { level: 9 }).length);
+    const kibibytes = bytes.reduce((sum, size) => sum + size, 0) / 1024;
+    const text = `${what} ${kibibytes.toFixed(1)} KiB gzipped of ${limit} allowed (${files.join(', ')})`;
+    if (kibibytes > limit) throw new Failure(text);
+    tell(`build: ${text}`);
+  }
+}
+
+/** What a browser loads: all that index.js leads to, with the larger one of the two builds' glue. */
+function downloadedJavaScript() {
+  const found = new Set(['dist/index.js']);
+  for (const file of found) {
+    const text = readFileSync(join(root, file), 'utf8');
+    for (const [, path] of text.matchAll(/(?:\bfrom|\bimport|\bimport\(|\bnew URL\()\s*["'`](\.[^"'`]*\.js)["'`]/g)) {
+      found.add(join(dirname(file), path));
+    }
+  }
+  const size = (file) => readFileSync(join(root, file)).length;
+  const glues = Object.keys(WASM).map((name) => join('dist', name, 'bilinormal.js'));
+  const smaller = glues.sort((a, b) => size(a) - size(b))[0];
+  return [...found].filter((file) => file !== smaller);
+}
+
+/** The files below a folder whose names end as asked, relative to the root, in a fixed order. */
+function filesIn(folder, ending = '') {
+  const entries = readdirSync(join(root, folder), { recursive: true, withFileTypes: true });
+  const files = entries.filter((entry) => entry.isFile() && entry.name.endsWith(ending));
+  return files.map((entry) => relative(root, join(entry.parentPath ?? entry.path, entry.name))).sort();
+}
+
+if (started(import.meta)) {
+  await main(() => {
+    setup();
+    build();
+  });
+}

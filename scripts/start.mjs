@@ -1,0 +1,22 @@
+// npm start: sets up, builds, and serves the page.
+
+import { join } from 'node:path';
+import { build, buildPage } from './build.mjs';
+import { Failure, main, root } from './run.mjs';
+import { serve } from './serve.mjs';
+import { setup } from './setup.mjs';
+
+const FIRST_PORT = 8080;
+
+await main(async () => {
+  setup();
+  build();
+  buildPage();
+  const wanted = process.env.PORT;
+  if (wanted && !/^\d{1,5}$/.test(wanted)) throw new Failure(`PORT is ${wanted}; wanted a number from 0 to 65535`);
+  const options = wanted ? { port: Number(wanted) } : { port: FIRST_PORT, next: true };
+  const { url } = await serve(join(root, 'www', 'dist'), options).catch((error) => {
+    throw new Failure(`no server on port ${options.port}: ${error.message}`);
+  });
+  console.log(`\nbilinormal: ${url} (end with Ctrl-C)`);
+});

@@ -1,0 +1,285 @@
+#!/usr/bin/env node
+// The command line: a PLY in, the same PLY with normals out.
+import { randomBytes } from 'node:crypto';
+import { rmSync } from 'node:fs';
+import { type FileHandle, open, readFile, realpath, rename, stat } from 'node:fs/promises';
+import { basename, dirname, join } from 'node:path';
+import { pathToFileURL } from 'node:url';
+import { parseArgs } from 'node:util';
+import { createEstimator } from './node.js';
+import type { EstimateOptions, PointCloud, Progress, Report, Source } from './types.js';
+
+const help = `Usage: bilinormal IN.ply -o OUT.ply [options]
+
+Computes one normal for each point of a PLY file, and writes the file with nx ny nz; every other property and element
+is kept, existing normals are replaced. IN may be - for standard input.
+
+  -o, --out FILE         where the result goes; it appears there when it is complete, so IN itself is allowed
+      --method NAME      bilinear (default), knn or egg
+      --cell auto        edge of the cubes from the data (default)
+      --cell-scale S     ... in multiples of cbrt(volume / points), 0.1 to 100; larger averages more noise away
+      --cell-size L      ... in the units of the file
+      --k N              neighbours of knn (default 16), candidates of egg (default 8)
+      --orient HOW       none (default), consistent, outward, viewpoint=x,y,z or up=x,y,z
+      --curvature        add the surface variation as the property curvature
+      --threads N        default: one for each processor
+      --ascii            write text instead of little-endian binary
+      --json             print the report as one line of JSON
+      --quiet            print no report and no progress
+      --help             print this
+
+Exit status: 0 done; 1 an error, told in one line; 2 wrong usage.
+`;
+
+class UsageError extends Error {}
+
+interface Task {
+  input: string;
+  output: string;
+  estimate: EstimateOptions;
+  threads: number | 'auto';
+  ascii: boolean;
+  json: boolean;
+  quiet: boolean;
+}
+
+function parse(args: string[]): Task | undefined {
+  let parsed;
+  try {
+    parsed = parseArgs({
+      args,
+      allowPositionals: true,
+      options: {
+        out: { type: 'string', short: 'o' },
+        method: { type: 'string' },
+        cell: { type: 'string' },
+        'cell-scale': { type: 'string' },
+        'cell-size': { type: 'string' },
+        k: { type: 'string' },
+        orient: { type: 'string' },
+        curvature: { type: 'boolean' },
+        threads: { type: 'string' },
+        ascii: { type: 'boolean' },
+        json: { type: 'boolean' },
+        quiet: { type: 'boolean' },
+        help: { type: 'boolean', short: 'h' },
+      },
+    });
+  } catch (error) {
+    // Node's advice in the sentences that follow is for another kind of program.
+    throw new UsageError((error as Error).message.split(/[.\n] /)[0]);
+  }
+  const { values, positionals } = parsed;
+  if (values.help) return undefined;
+  const [input, ...more] = positionals;
+  if (input === undefined) throw new UsageError('no input file');
+  if (more.length) throw new UsageError(`one input file at a time; ${more.join(' ')} came too`);
+  if (!values.out) throw new UsageError('no output file; give one with -o');
+  if (values.out === '-') throw new UsageError('the output cannot be standard output, where the report goes');
+  if (values.json && values.quiet) throw new UsageError('--json and --quiet exclude each other');
+  const estimate: EstimateOptions = {};
+  if (values.method !== undefined) estimate.method = choice('method', values.method, ['bilinear', 'knn', 'egg']);
+  const cells = [values.cell, values['cell-scale'], values['cell-size']].filter((value) => value !== undefined);
+  if (cells.length > 1) throw new UsageError('--cell, --cell-scale and --cell-size exclude each other');
+  if (values.cell !== undefined) estimate.cell = choice('cell', values.cell, ['auto']);
+  if (values['cell-scale'] !== undefined) estimate.cell = { scale: number('cell-scale', values['cell-scale']) };
+  if (values['cell-size'] !== undefined) estimate.cell = { size: number('cell-size', values['cell-size']) };
+  if (values.k !== undefined) estimate.k = wholeNumber('k', values.k);
+  if (values.orient !== undefined) estimate.orient = parseOrient(values.orient);
+  if (values.curvature) estimate.curvature = true;
+  return {
+    input,
+    output: values.out,
+    estimate,
+    threads: values.threads === undefined ? 'auto' : wholeNumber('threads', values.threads),
+    ascii: values.ascii ?? false,
+    json: values.json ?? false,
+    quiet: values.quiet ?? false,
+  };
+}
+
+function choice<const T extends string>(option: string, value: string, choices: readonly T[]): T {
+  const found = choices.find((one) => one === value);
+  if (found === undefined) throw new UsageError(`--${option} is ${value}; wanted ${choices.join(', ')}`);
+  return found;
+}
+
+function number(option: string, value: string): number {
+  const found = Number(value);
+  if (value.trim() === '' || !Number.isFinite(found)) throw new UsageError(`--${option} is ${value}; wanted a number`);
+  return found;
+}
+
+function wholeNumber(option: string, value: string): number {
+  const found = number(option, value);
+  if (!Number.isInteger(found) || found < 1)
+    throw new UsageError(`--${option} is ${value}; wanted a whole number of at least 1`);
+  return found;
+}
+
+function parseOrient(value: string): EstimateOptions['orient'] {
+  const [how, place] = value.split('=');
+  if (place === undefined) return choice('orient', value, ['none', 'consistent', 'outward']);
+  const [x, y, z, ...more] = place.split(',').map((part) => number('orient', part));
+  if (z === undefined || more.length)
+    throw new UsageError(`--orient is ${value}; wanted three numbers, as ${how}=x,y,z`);
+  if (how === 'viewpoint') return { viewpoint: [x!, y!, z] };
+  if (how === 'up') return { up: [x!, y!, z] };
+  throw new UsageError(`--orient is ${value}; wanted none, consistent, outward, viewpoint=x,y,z or up=x,y,z`);
+}
+
+/** Reads, estimates, writes. Errors name the file they belong to. */
+async function run(task: Task): Promise<Report> {
+  const source = await about(task.input, () => openInput(task.input));
+  await about(task.output, () => checkFolder(task.output));
+  const estimator = await createEstimator({ threads: task.threads });
+  const show = task.quiet || !process.stderr.isTTY ? undefined : showProgress;
+  try {
+    const { normals, curvature, report } = await about(task.input, async () => {
+      const cloud = await estimator.readPointCloud(source, { onProgress: show?.('reading') });
+      const options = { ...withViewpoint(task.estimate, cloud), transfer: true, onProgress: show?.('computing') };
+      return estimator.estimateNormals(cloud.positions, options);
+    });
+    const format = task.ascii ? 'ascii' : 'binary_little_endian';
+    const additions = { normals, ...(curvature && { curvature }) };
+    const ply = await about(task.input, () =>
+      estimator.writePly(source, additions, { format, onProgress: show?.('writing') }),
+    );
+    await about(task.output, () => writeWhole(task.output, ply));
+    return report;
+  } finally {
+    estimator.dispose();
+    if (show) process.stderr.write('\r\x1b[K');
+  }
+}
+
+/** Runs `work`; what it throws gets the name of the file. */
+async function about<T>(file: string, work: () => Promise<T>): Promise<T> {
+  try {
+    return await work();
+  } catch (error) {
+    throw new Error(`${file}: ${plain(error)}`);
+  }
+}
+
+/** The text of an error, on one line; of Node's errors about files, what a person needs. */
+function plain(error: unknown): string {
+  const { code, message } = error as NodeJS.ErrnoException;
+  const texts: Record<string, string> = {
+    ENOENT: 'no such file or folder',
+    EACCES: 'permission denied',
+    EISDIR: 'it is a folder',
+    ENOTDIR: 'a part of the path is not a folder',
+    ENOSPC: 'no space left on the device',
+    EROFS: 'the file system is read-only',
+  };
+  return texts[code ?? ''] ?? (message ?? String(error)).replace(/\s*\n\s*/g, ' ');
+}
+
+/** A regular file is read piece by piece in the worker, twice; what can be read only once is kept. */
+async function openInput(path: string): Promise<Source> {
+  if (path === '-') {
+    const pieces: Uint8Array[] = [];
+    for await (const piece of process.stdin) pieces.push(piece);
+    return new Blob(pieces as BlobPart[]);
+  }
+  const found = await stat(path);
+  if (found.isDirectory()) throw Object.assign(new Error(), { code: 'EISDIR' });
+  return found.isFile() ? pathToFileURL(path) : new Blob([await readFile(path)]);
+}
+
+/** Before the work, not after it. */
+async function checkFolder(path: string): Promise<void> {
+  if ((await stat(path).catch(() => undefined))?.isDirectory()) throw Object.assign(new Error(), { code: 'EISDIR' });
+  if (!(await stat(dirname(path))).isDirectory()) throw Object.assign(new Error(), { code: 'ENOTDIR' });
+}
+
+/** The command line speaks of the file's coordinates, the estimator of positions relative to the cloud's origin. */
+function withViewpoint(options: EstimateOptions, { origin }: PointCloud): EstimateOptions {
+  if (typeof options.orient !== 'object' || !('viewpoint' in options.orient)) return options;
+  const [x, y, z] = options.orient.viewpoint;
+  return { ...options, orient: { viewpoint: [x - origin[0], y - origin[1], z - origin[2]] } };
+}
+
+/** Under a temporary name beside `path`, then renamed: nobody ever sees half a file. */
+async function writeWhole(path: string, contents: Blob): Promise<void> {
+  // A link keeps pointing where it points, and a file keeps its permissions.
+  const target = await realpath(path).catch(() => path);
+  const existing = await stat(target).catch(() => undefined);
+  // A device or a pipe is written to, never replaced.
+  if (existing && !existing.isFile()) return writePieces(await open(target, 'w'), contents);
+
+  const temporary = join(dirname(target), `.${basename(target)}.${randomBytes(4).toString('hex')}`);
+  const remove = () => rmSync(temporary, { force: true });
+  const interrupted = (signal: NodeJS.Signals) => {
+    remove();
+    // As if nobody had listened.
+    process.removeAllListeners(signal);
+    process.kill(process.pid, signal);
+  };
+  process.on('SIGINT', interrupted).on('SIGTERM', interrupted);
+  try {
+    await writePieces(await open(temporary, 'wx', existing?.mode), contents);
+    await rename(temporary, target);
+  } catch (error) {
+    remove();
+    throw error;
+  } finally {
+    process.off('SIGINT', interrupted).off('SIGTERM', interrupted);
+  }
+}
+
+async function writePieces(file: FileHandle, contents: Blob): Promise<void> {
+  const pieceBytes = 1 << 23;
+  try {
+    for (let at = 0; at < contents.size; at += pieceBytes) {
+      await file.writeFile(new Uint8Array(await contents.slice(at, at + pieceBytes).arrayBuffer()));
+    }
+  } finally {
+    await file.close();
+  }
+}
+
+function showProgress(title: string) {
+  let shown = '';
+  return ({ phase, fraction }: Progress) => {
+    const line = `${title} ${String(Math.floor(100 * fraction)).padStart(3)} % ${phase}`;
+    if (line !== shown) process.stderr.write(`\r\x1b[K${line}`);
+    shown = line;
+  };
+}
+
+function format(report: Report): string {
+  const { total, ...phases } = report.milliseconds;
+  const count = (value: number) => value.toLocaleString('en');
+  const short = (value: number) => String(Number(value.toPrecision(4)));
+  const rows = [
+    ['points', count(report.points) + (report.unresolved ? `, ${count(report.unresolved)} without a normal` : '')],
+    ['cubes', `${count(report.cells)} of ${report.grid.map(count).join(' x ')}, ${count(report.nodes)} with a node`],
+    ['cube edge', `${short(report.cellSize)} (${short(report.scale)} L)`],
+    ['nodes used', report.nodesUsed.map((points, nodes) => `${nodes}: ${count(points)}`).join('   ')],
+    ['threads', report.threads + (report.fallbackReason ? ` (${report.fallbackReason})` : '')],
+    ['memory', `${short(report.peakBytes / 2 ** 20)} MiB at most`],
+    [
+      'time',
+      `${Math.round(total)} ms: ${Object.entries(phases)
+        .map(([phase, time]) => `${phase} ${Math.round(time)}`)
+        .join(', ')}`,
+    ],
+  ];
+  return rows.map(([name, text]) => `${name!.padEnd(11)} ${text}\n`).join('');
+}
+
+try {
+  const task = parse(process.argv.slice(2));
+  if (!task) process.stdout.write(help);
+  else {
+    const report = await run(task);
+    if (task.json) process.stdout.write(`${JSON.stringify(report)}\n`);
+    else if (!task.quiet) process.stdout.write(format(report));
+  }
+} catch (error) {
+  const usage = error instanceof UsageError;
+  process.stderr.write(`bilinormal: ${plain(error)}${usage ? '\nTry bilinormal --help' : ''}\n`);
+  process.exitCode = usage ? 2 : 1;
+}

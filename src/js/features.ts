@@ -1,0 +1,26 @@
+import type { Features } from './types.js';
+
+/** The smallest module that uses a vector. */
+const vectorModule = [
+  0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 10, 1, 8, 0, 65, 0, 253, 15, 253, 98, 11,
+];
+
+/** What this engine and this page allow. In a worker it answers for the worker. */
+export function detect(): Features {
+  const simd = WebAssembly.validate(new Uint8Array(vectorModule));
+  // Node has no such flag, because it needs none.
+  const isolated = globalThis.crossOriginIsolated ?? typeof SharedArrayBuffer === 'function';
+  let reason: string | undefined;
+  if (!simd) reason = 'this engine has no WebAssembly SIMD';
+  else if (!isolated)
+    reason =
+      'the page is not cross-origin isolated; that takes the headers Cross-Origin-Opener-Policy: same-origin and Cross-Origin-Embedder-Policy: require-corp';
+  else {
+    try {
+      new WebAssembly.Memory({ initial: 1, maximum: 1, shared: true });
+    } catch {
+      reason = 'this engine has no shared WebAssembly memory';
+    }
+  }
+  return { threads: !reason, simd, crossOriginIsolated: isolated, ...(reason && { reason }) };
+}

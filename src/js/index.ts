@@ -1,0 +1,40 @@
+/**
+ * Normals of large point clouds, computed in a worker by WebAssembly: the entry for browsers. Importing it does
+ * nothing; the first call starts a worker that all calls share.
+ *
+ * Sub-paths of the package: `bilinormal/three` (a point material), `bilinormal/worker` (the worker's script),
+ * `bilinormal/single.wasm` and `bilinormal/threads.wasm` (the two builds, for `createEstimator({ wasmUrl })`).
+ */
+import { makeApi } from './api.js';
+import { isForeign, link, startForeign } from './link.js';
+
+const api = /* @__PURE__ */ makeApi({
+  startWorker: (receive, fail) =>
+    link(
+      isForeign(import.meta.url)
+        ? startForeign('./worker.js', import.meta.url)
+        : // Bundlers know this form, and this form only.
+          new Worker(new URL('./worker.js', import.meta.url), { type: 'module' }),
+      receive,
+      fail,
+    ),
+  files: false,
+  base: () => globalThis.document?.baseURI ?? location.href,
+});
+
+/** One unit normal for each point; zero where there is none to be found. Time and memory grow with the points only. */
+export const estimateNormals = api.estimateNormals;
+/** Reads a PLY file: positions, and normals, colours and intensity where it has them. Other elements are skipped. */
+export const readPointCloud = api.readPointCloud;
+/**
+ * Writes a PLY with `add`: from a file (or anything that `readPointCloud` takes) with every other property and element
+ * kept and existing normals replaced, or from a cloud alone.
+ */
+export const writePly = api.writePly;
+/** An estimator with a worker of its own, and its own choice of threads, memory and place of the wasm files. */
+export const createEstimator = api.createEstimator;
+/** What this engine and this page allow, without starting anything. */
+export const features = api.features;
+
+export { BilinormalError, type ErrorCode } from './error.js';
+export type * from './types.js';

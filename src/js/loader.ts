@@ -1,0 +1,92 @@
+// Which of the two builds runs, and its start.
+import { BilinormalError } from './error.js';
+import { detect } from './features.js';
+import { pool } from './pool.js';
+import type { Mode, Start, StartWorker } from './protocol.js';
+import type { Glue, ThreadsGlue } from './wasm.js';
+
+/** What a worker needs from where it runs. */
+export interface Platform {
+  processors: number;
+  startThread: StartWorker;
+  load(url: URL): Promise<ArrayBuffer>;
+  /** Opens a local file by its address, where there are such. */
+  open?(url: string): { size: number; slice(from: number, to: number): { arrayBuffer(): Promise<ArrayBuffer> } };
+}
+
+export interface Loaded {
+  glue: Glue;
+  memory: WebAssembly.Memory;
+  mode: Mode;
+}
+
+/** More threads than this gain little: the work waits for memory. */
+const mostThreads = 16;
+/** Memory that the modules begin with, in pages of 64 KiB; equal to --initial-memory in scripts/*.toml. */
+const initialPages = 32;
+/** An engine that refuses this much shared memory gets no threads. */
+const leastMiB = 512;
+
+export async function load(start: Start, platform: Platform): Promise<Loaded> {
+  const features = detect();
+  if (!features.simd) throw new BilinormalError('unsupported', `${features.reason}; a newer browser has it`);
+  const { threads = 'auto' } = start;
+  const count = threads === 'auto' ? Math.min(platform.processors, mostThreads) : threads;
+  let { reason } = features;
+  if (count > 1 && !reason) {
+    try {
+      return await loadThreads(count, start, platform);
+    } catch (error) {
+      reason = `threads did not start: ${(error as Error).message}`;
+    }
+  }
+  if (threads === 'auto' && count < 2) reason = 'there is one processor';
+  if (threads === 1) reason = undefined;
+  return loadSingle(start, platform, { mode: 'single', threads: 1, ...(reason && { fallbackReason: reason }) });
+}
+
+async function loadThreads(threads: number, start: Start, platform: Platform): Promise<Loaded> {
+  const bundled = () => new URL('./threads/bilinormal_bg.wasm', import.meta.url);
+  const [glue, module]: [ThreadsGlue, WebAssembly.Module] = await Promise.all([
+    import('./threads/bilinormal.js' as string),
+    compile(start, 'threads.wasm', bundled, platform),
+  ]);
+  const memory = createMemory(start, true);
+  await glue.default({ module_or_path: module, memory });
+  pool.start = platform.startThread;
+  pool.channel = start.channel;
+  await glue.initThreadPool(threads);
+  return { glue, memory, mode: { mode: 'threads', threads } };
+}
+
+async function loadSingle(start: Start, platform: Platform, mode: Mode): Promise<Loaded> {
+  const bundled = () => new URL('./single/bilinormal_bg.wasm', import.meta.url);
+  const [glue, module]: [Glue, WebAssembly.Module] = await Promise.all([
+    import('./single/bilinormal.js' as string),
+    compile(start, 'single.wasm', bundled, platform),
+  ]);
+  const memory = createMemory(start, false);
+  await glue.default({ module_or_path: module, memory });
+  return { glue, memory, mode };
+}
+
+// Not streamed: that would refuse servers which send .wasm under another media type, for a file this small.
+async function compile({ wasmUrl }: Start, file: string, bundled: () => URL, { load }: Platform) {
+  const url = wasmUrl ? new URL(file, wasmUrl) : bundled();
+  try {
+    return await WebAssembly.compile(await load(url));
+  } catch (error) {
+    throw new BilinormalError('unsupported', `${url.href} did not load: ${(error as Error).message}`);
+  }
+}
+
+/** Shared memory is reserved at its maximum, and some engines refuse a large one: steps down until one is granted. */
+function createMemory({ memoryMaxMiB = 4096 }: Start, shared: boolean): WebAssembly.Memory {
+  for (let maximum = memoryMaxMiB * 16; ; maximum = Math.floor(maximum / 2)) {
+    try {
+      return new WebAssembly.Memory({ initial: initialPages, maximum, shared });
+    } catch (error) {
+      if (maximum / 2 < leastMiB * 16) throw error;
+    }
+  }
+}

@@ -1,0 +1,46 @@
+// The threads of the threads build. The generated glue imports `startWorkers` from here, in place of the helper that
+// wasm-bindgen-rayon brings: that one starts only in browsers, only from the page's own origin, and waits for ever
+// for a worker that does not load.
+import type { Link, StartWorker, ThreadBoot } from './protocol.js';
+
+/** Longest wait for all threads to answer. Each loads a small script, then a module that is compiled already. */
+const patience = 8000;
+
+interface PoolBuilder {
+  numThreads(): number;
+  receiver(): number;
+  build(): void;
+}
+
+/** How to start a thread; the worker that owns the pool sets it before it asks for threads. */
+export const pool: { start?: StartWorker; channel: string; kept?: unknown } = { channel: '' };
+
+/** Starts the threads, waits until all of them are ready to take work, and lets rayon hand it to them. */
+export async function startWorkers(module: WebAssembly.Module, memory: WebAssembly.Memory, builder: PoolBuilder) {
+  const boot: ThreadBoot = { module, memory, receiver: builder.receiver(), channel: pool.channel };
+  const links: Link[] = [];
+  const startThread = () =>
+    new Promise<void>((resolve, reject) => {
+      const fail = (reason: string) => reject(new Error(`a thread failed: ${reason}`));
+      const link = pool.start!((reason?: string) => (reason ? fail(reason) : resolve()), fail);
+      links.push(link);
+      link.post(boot);
+    });
+  let timer;
+  try {
+    await Promise.race([
+      Promise.all(Array.from({ length: builder.numThreads() }, startThread)),
+      new Promise((_, reject) => {
+        timer = setTimeout(() => reject(new Error(`a thread gave no answer in ${patience / 1000} s`)), patience);
+      }),
+    ]);
+  } catch (error) {
+    for (const link of links) link.end();
+    throw error;
+  } finally {
+    clearTimeout(timer);
+  }
+  builder.build();
+  // Firefox collects workers that nobody refers to (bug 1702191), and a collected builder frees what threads wait on.
+  pool.kept = [links, builder];
+}

@@ -1,0 +1,53 @@
+// What the calling thread, the worker and the threads of its pool say to each other.
+import type { Failure } from './error.js';
+import type { EstimatorOptions, Report } from './types.js';
+
+/** A worker as its owner sees it, in browsers and in Node alike. */
+export interface Link {
+  post(message: unknown, transfer?: Transferable[]): void;
+  /** Whether the process must stay alive for it (Node). */
+  hold(pending: boolean): void;
+  end(): void;
+}
+
+/** Starts a worker. `fail` hears what goes wrong in it as a whole, with the reason as text. */
+export type StartWorker = (receive: (message: any) => void, fail: (reason: string) => void) => Link;
+
+/** Bytes on their way into wasm memory: a Blob to be streamed, bytes to be copied, or the address of a local file. */
+export type Bytes = Blob | Uint8Array | string;
+
+export interface Start extends EstimatorOptions {
+  kind: 'start';
+  /** Name of the BroadcastChannel on which a thread tells its death: the worker that owns it cannot, it waits for it. */
+  channel: string;
+}
+
+export type Call =
+  | { kind: 'hello' }
+  | { kind: 'estimate'; positions: Uint8Array; double: boolean; options: object }
+  | { kind: 'read'; file: Bytes; maxPoints?: number }
+  | { kind: 'write'; file: Bytes; normals?: Uint8Array; curvature?: Uint8Array; ascii: boolean }
+  | {
+      kind: 'writeCloud';
+      positions: Uint8Array;
+      origin: Float64Array;
+      normals?: Uint8Array;
+      colors?: Uint8Array;
+      intensity?: Uint8Array;
+      curvature?: Uint8Array;
+      comments: string[];
+      ascii: boolean;
+    };
+
+export type Reply = { phase: string; fraction: number } | { failure: Failure } | { result: any };
+
+/** Which build runs, as it enters the report. */
+export type Mode = Pick<Report, 'mode' | 'threads' | 'fallbackReason'>;
+
+/** What one thread of the pool needs. */
+export interface ThreadBoot {
+  module: WebAssembly.Module;
+  memory: WebAssembly.Memory;
+  receiver: number;
+  channel: string;
+}

@@ -1,0 +1,140 @@
+/** `x0 y0 z0 x1 ...`; the length is a multiple of 3. Views of a part of a buffer and of shared memory are accepted. */
+export type Positions = Float32Array | Float64Array;
+
+/**
+ * Where bytes come from: a File or another Blob (streamed into the worker, never whole in JavaScript memory), bytes
+ * (copied), or a URL or Response (downloaded; in Node, `file:` URLs too).
+ */
+export type Source = Blob | ArrayBuffer | Uint8Array | URL | Response;
+
+/** How far a call has come: `fraction` rises from 0 to 1 over the whole call. */
+export interface Progress {
+  phase: string;
+  fraction: number;
+}
+
+export interface EstimateOptions {
+  /** Default `'bilinear'`, the paper's method; the others are its baselines. */
+  method?: 'bilinear' | 'knn' | 'egg';
+  /**
+   * Edge of the cubes, default `'auto'`. `scale`: multiples of the paper's L (Eq. 1), 0.1 to 100; `size`: in the units
+   * of the input. Small cubes follow detail, large ones average noise away.
+   */
+  cell?: 'auto' | { scale: number } | { size: number };
+  /** Neighbours of `'knn'` (default 16) and candidates of `'egg'` (default 8). */
+  k?: number;
+  /** How signs are chosen. Default `'none'`: deterministic, and nothing more. */
+  orient?:
+    'none' | 'consistent' | 'outward' | { viewpoint: [number, number, number] } | { up: [number, number, number] };
+  /** Also return the surface variation lambda3 / (lambda1 + lambda2 + lambda3), one float a point. Default false. */
+  curvature?: boolean;
+  /**
+   * Default false: the positions are copied when the call is made. True: their buffer is handed over and detached.
+   * A view of a part of a buffer, or of shared memory, is copied all the same: the rest is not the call's to take.
+   */
+  transfer?: boolean;
+  /** Hears a fraction that rises from 0 to exactly 1. */
+  onProgress?: (progress: Progress) => void;
+  /** Rejects the call with `signal.reason`, at once; the estimator stays usable. */
+  signal?: AbortSignal;
+}
+
+export interface EstimateResult {
+  /** Unit length, or zero where a point is not finite or has no neighbours; as many numbers as `positions`. */
+  normals: Float32Array;
+  curvature?: Float32Array;
+  report: Report;
+}
+
+export interface Report {
+  points: number;
+  /** Points that got the zero vector: not finite, or without neighbours. */
+  unresolved: number;
+  /** Occupied cubes. */
+  cells: number;
+  /** Cubes with a valid node. */
+  nodes: number;
+  /** Cubes along each axis. */
+  grid: [number, number, number];
+  /** Edge of the cubes in the units of the input. */
+  cellSize: number;
+  /** Edge of the cubes in multiples of the paper's L. */
+  scale: number;
+  /** Points interpolated from 0, 1, 2, 3 and 4 nodes. */
+  nodesUsed: [number, number, number, number, number];
+  /**
+   * Each phase in the wasm module, and `total`: from the moment the call left the queue to its result in the calling
+   * thread, so with the start of the worker if this call needed one, and with copying in and out.
+   */
+  milliseconds: { total: number; [phase: string]: number };
+  mode: 'threads' | 'single';
+  threads: number;
+  /** Why there are no threads. */
+  fallbackReason?: string;
+  /** Most wasm memory in use at once during the call. */
+  peakBytes: number;
+}
+
+export interface PointCloud {
+  count: number;
+  /** Relative to `origin`: add it to get the file's coordinates. */
+  positions: Float32Array;
+  /** `[0, 0, 0]` unless the file's coordinates need more digits than single precision has. */
+  origin: [number, number, number];
+  normals?: Float32Array;
+  /** Red, green, blue, alpha of each point. */
+  colors?: Uint8Array;
+  intensity?: Float32Array;
+  source: { format: string; properties: string[]; comments: string[] };
+}
+
+export interface ReadOptions {
+  signal?: AbortSignal;
+  onProgress?: (progress: Progress) => void;
+  /** Refuse a file that has more points, before memory is taken for them. */
+  maxPoints?: number;
+}
+
+/** What a file gains: `normals` as nx ny nz, three numbers a point; `curvature` one number a point. */
+export interface Additions {
+  normals?: Float32Array;
+  curvature?: Float32Array;
+}
+
+export interface WriteOptions {
+  /** Default `'binary_little_endian'`. */
+  format?: 'binary_little_endian' | 'ascii';
+  signal?: AbortSignal;
+  onProgress?: (progress: Progress) => void;
+}
+
+export interface EstimatorOptions {
+  /** Default `'auto'`: one for each processor, at most 16. 1 is the single-threaded build. */
+  threads?: number | 'auto';
+  /**
+   * A folder that holds `single.wasm` and `threads.wasm` (this package exports both under these names), for those who
+   * host them themselves. A relative address counts from the page; in Node, from the working directory.
+   */
+  wasmUrl?: string | URL;
+  /** Most memory the wasm module may take, 16 to 4096. Default 4096, or the most that the engine grants. */
+  memoryMaxMiB?: number;
+}
+
+export interface Features {
+  threads: boolean;
+  simd: boolean;
+  /** Whether memory may be shared between threads. Node needs no isolation for that: true there. */
+  crossOriginIsolated: boolean;
+  /** Why there are no threads, or no SIMD. */
+  reason?: string;
+}
+
+/** A worker with its queue. Calls wait for each other; each has its own progress and abort. */
+export interface Estimator {
+  estimateNormals(positions: Positions, options?: EstimateOptions): Promise<EstimateResult>;
+  readPointCloud(source: Source, options?: ReadOptions): Promise<PointCloud>;
+  writePly(cloud: PointCloud | Source, add: Additions, options?: WriteOptions): Promise<Blob>;
+  features(): Promise<Features>;
+  /** Ends the worker and its threads; calls that are pending, and later ones, reject. */
+  dispose(): void;
+}

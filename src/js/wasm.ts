@@ -1,0 +1,65 @@
+// The border to the wasm module, as the generated glue in single/ and threads/ exports it.
+
+/** Hears where a call stands; `fraction` is of the whole call into wasm. */
+export type Tell = (phase: string, fraction: number) => void;
+
+/** Bytes owned by wasm. */
+export interface Buffer {
+  readonly pointer: number;
+  readonly byteLength: number;
+  free(): void;
+}
+
+export interface Estimation {
+  takeNormals(): Buffer;
+  readonly report: object;
+  free(): void;
+}
+
+export interface Cloud {
+  readonly count: number;
+  readonly origin: Float64Array;
+  readonly format: string;
+  readonly properties: string[];
+  readonly comments: string[];
+  takePositions(): Buffer;
+  takeNormals(): Buffer | undefined;
+  takeColors(): Buffer | undefined;
+  takeIntensity(): Buffer | undefined;
+  free(): void;
+}
+
+/** A build's exports. Calls consume the buffers they are given. */
+export interface Glue {
+  default(options: {
+    module_or_path: WebAssembly.Module;
+    memory?: WebAssembly.Memory;
+  }): Promise<{ memory: WebAssembly.Memory }>;
+  Buffer: new (byteLength: number) => Buffer;
+  estimate(positions: Buffer, double: boolean, options: object, tell: Tell): Estimation;
+  readPly(file: Buffer, maxPoints: number | undefined, tell: Tell): Cloud;
+  writePly(
+    file: Buffer,
+    normals: Buffer | undefined,
+    curvature: Buffer | undefined,
+    ascii: boolean,
+    tell: Tell,
+  ): Buffer;
+  writeCloud(
+    positions: Buffer,
+    origin: Float64Array,
+    normals: Buffer | undefined,
+    colors: Buffer | undefined,
+    intensity: Buffer | undefined,
+    curvature: Buffer | undefined,
+    comments: string[],
+    ascii: boolean,
+    tell: Tell,
+  ): Buffer;
+}
+
+/** What only the threads build exports. */
+export interface ThreadsGlue extends Glue {
+  initThreadPool(threads: number): Promise<void>;
+  wbg_rayon_start_worker(receiver: number): void;
+}

@@ -1,0 +1,116 @@
+//! Blocks of memory that JavaScript fills and reads through views.
+
+use crate::error::Error;
+use crate::points::reserve;
+use bytemuck::AnyBitPattern;
+use wasm_bindgen::prelude::*;
+
+/// Bytes owned by the module, beginning at a multiple of 8.
+///
+/// JavaScript reaches them by `new Uint8Array(memory.buffer, pointer, byteLength)`, a view to be made anew after every
+/// call into the module. A buffer handed to a function is consumed by it; any other is to be freed.
+#[wasm_bindgen]
+#[derive(Debug)]
+pub struct Buffer {
+    storage: Storage,
+    byte_length: usize,
+}
+
+/// A block goes back to the allocator as the type it came as, so numbers are not copied to become bytes.
+#[derive(Debug)]
+enum Storage {
+    Floats(Vec<f32>),
+    Bytes(Vec<u8>),
+}
+
+#[wasm_bindgen]
+impl Buffer {
+    /// Takes `byteLength` zeroed bytes, or throws a `limit` error and takes nothing.
+    #[wasm_bindgen(constructor)]
+    pub fn new(byte_length: f64) -> Result<Buffer, JsValue> {
+        if !(byte_length >= 0.0 && byte_length.fract() == 0.0 && byte_length <= u64::MAX as f64) {
+            let message = format!("byteLength is {byte_length}; wanted a whole number of at least 0");
+            return Err(Error::Input(message).into());
+        }
+        let too_large = Error::memory("the data", byte_length as u64);
+        let Some(words) = u32::try_from(byte_length as u64).ok().map(|bytes| bytes.div_ceil(4) as usize) else {
+            return Err(too_large.into());
+        };
+        let byte_length = byte_length as usize;
+        let mut floats = Vec::new();
+        floats.try_reserve_exact(words).map_err(|_| too_large)?;
+        floats.resize(words, 0.0);
+        Ok(Self { storage: Storage::Floats(floats), byte_length })
+    }
+
+    /// Where the bytes begin in the module's memory.
+    #[wasm_bindgen(getter)]
+    pub fn pointer(&self) -> usize {
+        self.bytes().as_ptr() as usize
+    }
+
+    /// The number of bytes.
+    #[wasm_bindgen(getter, js_name = byteLength)]
+    pub fn byte_length(&self) -> usize {
+        self.byte_length
+    }
+}
+
+impl Buffer {
+    pub(super) fn bytes(&self) -> &[u8] {
+        match &self.storage {
+            Storage::Floats(floats) => &bytemuck::cast_slice(floats)[..self.byte_length],
+            Storage::Bytes(bytes) => bytes,
+        }
+    }
+
+    /// The bytes as numbers, `per_point` for each point.
+    pub(super) fn numbers<T: AnyBitPattern>(&self, name: &str, per_point: usize) -> Result<&[T], Error> {
+        let bytes = self.bytes();
+        if bytes.is_empty() {
+            return Ok(&[]);
+        }
+        let wanted = per_point * size_of::<T>();
+        // Never misaligned: the allocator aligns every block to 8 bytes.
+        match bytemuck::try_cast_slice(bytes) {
+            Ok(numbers) if bytes.len().is_multiple_of(wanted) => Ok(numbers),
+            _ => Err(Error::Input(format!("{name} has {} bytes; wanted a multiple of {wanted}", bytes.len()))),
+        }
+    }
+
+    /// Gives the numbers away, without a copy unless they were made as bytes.
+    pub(super) fn into_floats(self, name: &str, per_point: usize) -> Result<Vec<f32>, Error> {
+        let numbers = self.numbers(name, per_point)?;
+        match self.storage {
+            Storage::Bytes(_) => copy(numbers, name),
+            Storage::Floats(floats) => Ok(floats),
+        }
+    }
+
+    /// Gives the bytes away, with a copy if JavaScript made the buffer.
+    pub(super) fn into_bytes(self, name: &str) -> Result<Vec<u8>, Error> {
+        match self.storage {
+            Storage::Bytes(bytes) => Ok(bytes),
+            Storage::Floats(_) => copy(self.bytes(), name),
+        }
+    }
+}
+
+fn copy<T: Copy>(items: &[T], name: &str) -> Result<Vec<T>, Error> {
+    let mut copied = Vec::new();
+    reserve(&mut copied, items.len(), name)?;
+    copied.extend_from_slice(items);
+    Ok(copied)
+}
+
+impl From<Vec<f32>> for Buffer {
+    fn from(floats: Vec<f32>) -> Self {
+        Self { byte_length: size_of_val(&*floats), storage: Storage::Floats(floats) }
+    }
+}
+
+impl From<Vec<u8>> for Buffer {
+    fn from(bytes: Vec<u8>) -> Self {
+        Self { byte_length: bytes.len(), storage: Storage::Bytes(bytes) }
+    }
+}

@@ -1,0 +1,40 @@
+//! Errors as JavaScript sees them.
+
+use super::{memory, set};
+use crate::error::{Error, Place};
+use wasm_bindgen::prelude::*;
+
+/// A JavaScript `Error` with `code`, and with what else is known: `line` or `byte`, `needed` and `available`.
+impl From<Error> for JsValue {
+    fn from(error: Error) -> Self {
+        let error = match error {
+            Error::Limit { message, needed, available: None } => {
+                Error::Limit { message, needed, available: Some(memory::available(needed)) }
+            }
+            error => error,
+        };
+        let thrown = js_sys::Error::new(&error.to_string());
+        let code = match error {
+            Error::Format { place, .. } => {
+                match place {
+                    Some(Place::Line(line)) => set(&thrown, "line", line as f64),
+                    Some(Place::Byte(byte)) => set(&thrown, "byte", byte as f64),
+                    None => {}
+                }
+                "format"
+            }
+            Error::Limit { needed, available, .. } => {
+                set(&thrown, "needed", needed as f64);
+                if let Some(available) = available {
+                    set(&thrown, "available", available as f64);
+                }
+                "limit"
+            }
+            Error::Input(_) => "input",
+            Error::Unsupported(_) => "unsupported",
+            Error::Cancelled => "cancelled",
+        };
+        set(&thrown, "code", code);
+        thrown.into()
+    }
+}

@@ -1,0 +1,322 @@
+//! The border, called as JavaScript calls it, in headless Node.
+#![cfg(target_arch = "wasm32")]
+
+use bilinormal::wasm::{Buffer, Estimation, estimate, read_ply, write_cloud, write_ply};
+use js_sys::{Function, JSON, Reflect, Uint8Array, WebAssembly};
+use wasm_bindgen::prelude::*;
+use wasm_bindgen_test::wasm_bindgen_test;
+
+const POINTS: usize = 4000;
+
+/// A view of a buffer's bytes, as JavaScript makes it.
+fn view(buffer: &Buffer) -> Uint8Array {
+    let memory: WebAssembly::Memory = wasm_bindgen::memory().unchecked_into();
+    Uint8Array::new_with_byte_offset_and_length(&memory.buffer(), buffer.pointer() as u32, buffer.byte_length() as u32)
+}
+
+fn filled(bytes: &[u8]) -> Buffer {
+    let buffer = Buffer::new(bytes.len() as f64).unwrap();
+    view(&buffer).copy_from(bytes);
+    buffer
+}
+
+fn floats(numbers: &[f32]) -> Buffer {
+    filled(bytemuck::cast_slice(numbers))
+}
+
+fn doubles(numbers: &[f64]) -> Buffer {
+    filled(bytemuck::cast_slice(numbers))
+}
+
+fn numbers(buffer: &Buffer) -> Vec<f32> {
+    view(buffer).to_vec().chunks(4).map(|bytes| f32::from_le_bytes(bytes.try_into().unwrap())).collect()
+}
+
+fn nobody() -> Function {
+    Function::new_no_args("")
+}
+
+fn options(json: &str) -> JsValue {
+    JSON::parse(json).unwrap()
+}
+
+fn get(object: &JsValue, name: &str) -> JsValue {
+    Reflect::get(object, &name.into()).unwrap()
+}
+
+fn number(object: &JsValue, name: &str) -> f64 {
+    get(object, name).as_f64().unwrap_or_else(|| panic!("{name} is no number"))
+}
+
+/// The code and the message of what was thrown.
+fn thrown<T>(result: Result<T, JsValue>) -> (String, String) {
+    let error = result.err().expect("nothing was thrown");
+    assert!(error.is_instance_of::<js_sys::Error>());
+    (get(&error, "code").as_string().unwrap(), get(&error, "message").as_string().unwrap())
+}
+
+/// Points spread evenly over the unit sphere (golden spiral), so each is its own normal.
+fn sphere() -> Vec<f64> {
+    let turn = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    let point = |i: usize| {
+        let z = 1.0 - (2 * i + 1) as f64 / POINTS as f64;
+        let (sin, cos) = (turn * i as f64).sin_cos();
+        let radius = (1.0 - z * z).sqrt();
+        [radius * cos, radius * sin, z]
+    };
+    (0..POINTS).flat_map(point).collect()
+}
+
+fn single(numbers: &[f64]) -> Vec<f32> {
+    numbers.iter().map(|&number| number as f32).collect()
+}
+
+/// The largest angle to the sphere's own normals, in degrees, after a look at the lengths.
+fn largest_angle(normals: &[f32], sphere: &[f64]) -> f64 {
+    assert_eq!(normals.len(), sphere.len());
+    let angle = |(normal, truth): (&[f32], &[f64])| {
+        let normal: Vec<f64> = normal.iter().map(|&number| f64::from(number)).collect();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        assert!((dot(&normal, &normal).sqrt() - 1.0).abs() < 1e-5, "{normal:?} is no unit vector");
+        dot(&normal, truth).abs().min(1.0).acos().to_degrees()
+    };
+    normals.chunks(3).zip(sphere.chunks(3)).map(angle).fold(0.0, f64::max)
+}
+
+fn normals_of(mut estimation: Estimation) -> Vec<f32> {
+    numbers(&estimation.take_normals().unwrap())
+}
+
+#[wasm_bindgen_test]
+fn normals_of_a_sphere_are_unit_vectors_close_to_the_truth() {
+    let sphere = sphere();
+    let estimation = estimate(floats(&single(&sphere)), false, &options("{}"), &nobody()).unwrap();
+    let angle = largest_angle(&normals_of(estimation), &sphere);
+    assert!(angle < 4.0, "{angle} degrees off");
+}
+
+#[wasm_bindgen_test]
+fn the_report_has_every_field_of_the_contract() {
+    let points = single(&sphere());
+    let options =
+        options(r#"{ "method": "bilinear", "cell": { "scale": 1.5 }, "orient": "none", "curvature": false }"#);
+    let report = estimate(floats(&points), false, &options, &nobody()).unwrap().report().into();
+    assert_eq!(number(&report, "points"), POINTS as f64);
+    assert_eq!(number(&report, "unresolved"), 0.0);
+    assert!(number(&report, "cells") >= number(&report, "nodes"));
+    assert!(number(&report, "nodes") > 0.0);
+    assert!(number(&report, "cellSize") > 0.0);
+    assert_eq!(number(&report, "scale"), 1.5);
+    let counts =
+        |name| js_sys::Array::from(&get(&report, name)).iter().map(|n| n.as_f64().unwrap()).collect::<Vec<_>>();
+    assert_eq!(counts("grid").len(), 3);
+    assert_eq!(counts("nodesUsed").len(), 5);
+    assert_eq!(counts("nodesUsed").iter().sum::<f64>(), POINTS as f64);
+    // Input and output together are 24 bytes a point.
+    assert!(number(&report, "peakBytes") >= 24.0 * POINTS as f64);
+    assert!(number(&report, "peakBytes") < 1000.0 * POINTS as f64);
+    let milliseconds = get(&report, "milliseconds");
+    let phases = js_sys::Object::keys(milliseconds.unchecked_ref::<js_sys::Object>());
+    assert!(phases.length() >= 3);
+    assert!(phases.iter().all(|phase| number(&milliseconds, &phase.as_string().unwrap()) >= 0.0));
+}
+
+#[wasm_bindgen_test]
+fn doubles_near_the_origin_give_what_floats_give() {
+    // Exact in both, and with the median at zero: nothing is rounded.
+    let points: Vec<f64> = sphere().iter().map(|number| (number * 4096.0).round() / 4096.0).collect();
+    let options = options(r#"{ "cell": { "scale": 1.5 } }"#);
+    let of_floats = normals_of(estimate(floats(&single(&points)), false, &options, &nobody()).unwrap());
+    let of_doubles = normals_of(estimate(doubles(&points), true, &options, &nobody()).unwrap());
+    let difference = of_floats.iter().zip(&of_doubles).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(difference < 1e-3, "{difference} apart");
+}
+
+#[wasm_bindgen_test]
+fn doubles_far_from_the_origin_keep_their_precision() {
+    let sphere = sphere();
+    let far: Vec<f64> = sphere.chunks(3).flat_map(|p| [p[0] + 4.5e6, p[1] - 5.4e6, p[2] + 1e5]).collect();
+    let estimation = estimate(doubles(&far), true, &options("{}"), &nobody()).unwrap();
+    let angle = largest_angle(&normals_of(estimation), &sphere);
+    assert!(angle < 4.0, "{angle} degrees off");
+}
+
+#[wasm_bindgen_test]
+fn no_points_give_no_normals() {
+    let estimation = estimate(floats(&[]), false, &JsValue::UNDEFINED, &nobody()).unwrap();
+    assert!(normals_of(estimation).is_empty());
+    let estimation = estimate(doubles(&[]), true, &JsValue::UNDEFINED, &nobody()).unwrap();
+    assert!(normals_of(estimation).is_empty());
+}
+
+#[wasm_bindgen_test]
+fn progress_rises_from_0_to_1() {
+    let told = js_sys::Array::new();
+    let listener = Closure::<dyn FnMut(JsValue, JsValue)>::new({
+        let told = told.clone();
+        move |phase: JsValue, fraction: JsValue| {
+            assert!(phase.is_string());
+            told.push(&fraction);
+        }
+    });
+    estimate(floats(&single(&sphere())), false, &options("{}"), listener.as_ref().unchecked_ref()).unwrap();
+    let told: Vec<f64> = told.iter().map(|fraction| fraction.as_f64().unwrap()).collect();
+    assert!(told.is_sorted(), "{told:?}");
+    assert_eq!(told.first(), Some(&0.0));
+    assert_eq!(told.last(), Some(&1.0));
+}
+
+#[wasm_bindgen_test]
+fn a_listener_that_throws_stops_nothing() {
+    let thrower = Function::new_no_args("throw new Error('not mine')");
+    assert!(estimate(floats(&single(&sphere())), false, &options("{}"), &thrower).is_ok());
+}
+
+#[wasm_bindgen_test]
+fn normals_are_given_away_once() {
+    let mut estimation = estimate(floats(&single(&sphere())), false, &options("{}"), &nobody()).unwrap();
+    estimation.take_normals().unwrap();
+    assert_eq!(thrown(estimation.take_normals()).0, "input");
+}
+
+#[wasm_bindgen_test]
+fn wrong_options_are_refused_with_what_came_and_what_was_wanted() {
+    let cases = [
+        ("7", "options is 7; wanted an object"),
+        (r#"{ "Method": "knn" }"#, "option 'Method' is unknown; wanted any of method, cell, k"),
+        (r#"{ "method": "pca" }"#, "method is 'pca'; wanted 'bilinear', 'knn' or 'egg'"),
+        (
+            r#"{ "cell": { "radius": 1 } }"#,
+            r#"cell is {"radius":1}; wanted 'auto', { scale: number } or { size: number }"#,
+        ),
+        (r#"{ "cell": { "scale": 1, "size": 2 } }"#, r#"cell is {"scale":1,"size":2}; wanted 'auto'"#),
+        (r#"{ "cell": null }"#, "cell is null; wanted 'auto'"),
+        (r#"{ "cell": { "scale": "1" } }"#, "cell.scale is '1'; wanted a number"),
+        (r#"{ "cell": { "scale": 0.01 } }"#, "cell.scale is 0.01; wanted a number from 0.1 to 100"),
+        (r#"{ "cell": { "size": -1 } }"#, "cell.size is -1; wanted a finite number above 0"),
+        (r#"{ "k": 1.5 }"#, "k is 1.5; wanted a whole number of at least 1"),
+        (r#"{ "orient": "in" }"#, "orient is 'in'; wanted 'none', 'consistent', 'outward'"),
+        (r#"{ "orient": { "up": [0, 1] } }"#, "orient.up is [0,1]; wanted three finite numbers [x, y, z]"),
+        (r#"{ "orient": { "viewpoint": [0, 1, "2"] } }"#, r#"orient.viewpoint is [0,1,"2"]; wanted three finite"#),
+        (r#"{ "curvature": 1 }"#, "curvature is 1; wanted true or false"),
+    ];
+    for (json, wanted) in cases {
+        let (code, message) = thrown(estimate(floats(&[]), false, &options(json), &nobody()));
+        assert_eq!(code, "input", "{json}");
+        assert!(message.starts_with(wanted), "{json}: {message}");
+    }
+}
+
+#[wasm_bindgen_test]
+fn what_this_version_lacks_is_unsupported_and_says_what_it_offers() {
+    let (code, message) = thrown(estimate(floats(&[]), false, &options(r#"{ "method": "egg" }"#), &nobody()));
+    assert_eq!(code, "unsupported");
+    assert!(message.contains("'bilinear'"), "{message}");
+}
+
+#[wasm_bindgen_test]
+fn bytes_that_are_not_whole_points_are_refused() {
+    let (code, message) = thrown(estimate(filled(&[0; 20]), false, &options("{}"), &nobody()));
+    assert_eq!((code.as_str(), message.as_str()), ("input", "positions has 20 bytes; wanted a multiple of 12"));
+    let (code, message) = thrown(estimate(filled(&[0; 12]), true, &options("{}"), &nobody()));
+    assert_eq!((code.as_str(), message.as_str()), ("input", "positions has 12 bytes; wanted a multiple of 24"));
+}
+
+#[wasm_bindgen_test]
+fn a_buffer_is_zeroed_and_begins_at_a_multiple_of_8() {
+    for length in [0, 1, 7, 8, 1001] {
+        let buffer = Buffer::new(f64::from(length)).unwrap();
+        assert_eq!(buffer.byte_length(), length as usize);
+        assert!(length == 0 || buffer.pointer().is_multiple_of(8));
+        assert!(view(&buffer).to_vec().iter().all(|&byte| byte == 0));
+    }
+}
+
+#[wasm_bindgen_test]
+fn a_buffer_that_does_not_fit_is_a_limit_error_and_no_trap() {
+    for length in [5e9, 4294967296.0, 4294967295.0, 3e9] {
+        let error = Buffer::new(length).unwrap_err();
+        assert_eq!(get(&error, "code"), "limit");
+        assert_eq!(number(&error, "needed"), length);
+        assert!(number(&error, "available") < length);
+        assert!(number(&error, "available") > 1e9);
+    }
+    Buffer::new(1e6).unwrap();
+    for length in [-1.0, 0.5, f64::NAN, f64::INFINITY] {
+        assert_eq!(thrown(Buffer::new(length)).0, "input");
+    }
+}
+
+const TRIANGLE: &str = "ply\nformat ascii 1.0\ncomment three corners\nelement vertex 3\nproperty float x\n\
+    property float y\nproperty float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
+    property float intensity\nend_header\n0 0 0 255 0 0 0.5\n1 0 0 0 255 0 0.25\n0 1 0 0 0 255 1\n";
+
+#[wasm_bindgen_test]
+fn a_ply_file_is_read_into_its_arrays() {
+    let mut cloud = read_ply(filled(TRIANGLE.as_bytes()), None, &nobody()).unwrap();
+    assert_eq!(cloud.count(), 3);
+    assert_eq!(*cloud.origin(), [0.0; 3]);
+    assert_eq!(cloud.format(), "ascii");
+    assert_eq!(cloud.properties(), ["x", "y", "z", "red", "green", "blue", "intensity"]);
+    assert_eq!(cloud.comments(), ["three corners"]);
+    assert_eq!(numbers(&cloud.take_positions().unwrap()), [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    assert_eq!(thrown(cloud.take_positions()).0, "input");
+    assert!(cloud.take_normals().is_none());
+    let colors = view(&cloud.take_colors().unwrap()).to_vec();
+    assert_eq!(colors, [255, 0, 0, 255, 0, 255, 0, 255, 0, 0, 255, 255]);
+    assert_eq!(numbers(&cloud.take_intensity().unwrap()), [0.5, 0.25, 1.0]);
+}
+
+#[wasm_bindgen_test]
+fn normals_put_into_a_file_are_read_from_it() {
+    let normals = [0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0];
+    for ascii in [true, false] {
+        let file = write_ply(filled(TRIANGLE.as_bytes()), Some(floats(&normals)), None, ascii, &nobody()).unwrap();
+        let mut cloud = read_ply(file, None, &nobody()).unwrap();
+        assert_eq!(numbers(&cloud.take_normals().unwrap()), normals);
+        assert_eq!(numbers(&cloud.take_intensity().unwrap()), [0.5, 0.25, 1.0]);
+    }
+}
+
+#[wasm_bindgen_test]
+fn a_cloud_alone_becomes_a_file() {
+    let positions = [0.0, 0.5, 1.0, 1.5, 2.0, 2.5];
+    let normals = [0.0, 0.0, 1.0, 0.0, 1.0, 0.0];
+    let origin = [4.5e6, -5.4e6, 0.0];
+    let file = write_cloud(
+        floats(&positions),
+        &origin,
+        Some(floats(&normals)),
+        Some(filled(&[1, 2, 3, 255, 4, 5, 6, 255])),
+        Some(floats(&[0.25, 0.5])),
+        None,
+        vec!["from memory".into()],
+        false,
+        &nobody(),
+    );
+    let mut cloud = read_ply(file.unwrap(), None, &nobody()).unwrap();
+    assert_eq!(cloud.comments(), ["from memory"]);
+    let (read_origin, read) = (cloud.origin(), numbers(&cloud.take_positions().unwrap()));
+    for (i, (read, written)) in read.iter().zip(positions).enumerate() {
+        assert_eq!(f64::from(*read) + read_origin[i % 3], f64::from(written) + origin[i % 3]);
+    }
+    assert_eq!(numbers(&cloud.take_normals().unwrap()), normals);
+    assert_eq!(view(&cloud.take_colors().unwrap()).to_vec(), [1, 2, 3, 255, 4, 5, 6, 255]);
+    assert_eq!(numbers(&cloud.take_intensity().unwrap()), [0.25, 0.5]);
+}
+
+#[wasm_bindgen_test]
+fn a_broken_file_says_where() {
+    let error = read_ply(filled(&TRIANGLE.as_bytes()[..TRIANGLE.len() - 8]), None, &nobody()).unwrap_err();
+    assert_eq!(get(&error, "code"), "format");
+    assert!(get(&error, "line").as_f64().is_some() || get(&error, "byte").as_f64().is_some());
+    assert_eq!(thrown(read_ply(filled(b"solid stl"), None, &nobody())).0, "format");
+}
+
+#[wasm_bindgen_test]
+fn arrays_that_do_not_fit_the_file_are_refused() {
+    let short = write_ply(filled(TRIANGLE.as_bytes()), Some(floats(&[0.0, 0.0, 1.0])), None, true, &nobody());
+    assert_eq!(thrown(short).0, "input");
+    let uneven = write_ply(filled(TRIANGLE.as_bytes()), Some(filled(&[0; 35])), None, true, &nobody());
+    assert_eq!(thrown(uneven).0, "input");
+}

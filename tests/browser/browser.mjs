@@ -1,0 +1,154 @@
+// What the tests of the page share: a browser, the page served with and without isolation, scans made in the test.
+
+import { mkdirSync, readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { chromium } from 'playwright-core';
+import { root } from '../../scripts/run.mjs';
+import { serve } from '../../scripts/serve.mjs';
+import { findBrowser } from '../../scripts/setup.mjs';
+
+/** For people to look at; not in git. */
+export const ARTEFACTS = join(root, 'tests', 'artefacts');
+const QUIET = [
+  '--no-sandbox',
+  '--disable-dev-shm-usage',
+  '--disable-background-networking',
+  '--disable-component-update',
+  '--disable-sync',
+  '--disable-quic',
+  '--no-first-run',
+];
+
+/**
+ * A browser and two servers. The one without isolation serves the page from a sub-folder, as any file server may.
+ * `close` ends them, and fails if a page has logged an error or asked another host for anything.
+ */
+export async function openBrowser() {
+  mkdirSync(ARTEFACTS, { recursive: true });
+  const isolated = await serve(join(root, 'www', 'dist'));
+  const plain = await serve(join(root, 'www'), { headers: {} });
+  const browser = await chromium.launch({ executablePath: findBrowser(), args: QUIET });
+  const surprises = [];
+  return {
+    isolated: isolated.url,
+    plain: `${plain.url}dist/`,
+    async openPage(address, options = {}) {
+      const page = await browser.newPage({ viewport: { width: 1280, height: 800 }, ...options });
+      page.on('pageerror', (error) => surprises.push(`page error: ${error.message}`));
+      page.on('console', (message) => {
+        if (message.type() === 'error') surprises.push(`console: ${message.text()}`);
+      });
+      page.on('request', (request) => {
+        if (!/^(data|blob):/.test(request.url()) && new URL(request.url()).origin !== new URL(address).origin) {
+          surprises.push(`request to ${request.url()}`);
+        }
+      });
+      if (options.script) await page.addInitScript(options.script);
+      await page.goto(address);
+      return page;
+    },
+    /** Takes what was recorded since the last call. */
+    surprises: () => surprises.splice(0),
+    async close() {
+      await browser.close();
+      await Promise.all([isolated.close(), plain.close()]);
+    },
+  };
+}
+
+/** A binary PLY of the unit sphere, evenly covered in a random order; `colored` adds red, green, blue. */
+export function spherePly(points, { colored = false } = {}) {
+  const colors = colored ? 'property uchar red\nproperty uchar green\nproperty uchar blue\n' : '';
+  const header = Buffer.from(
+    `ply\nformat binary_little_endian 1.0\nelement vertex ${points}\n` +
+      `property float x\nproperty float y\nproperty float z\n${colors}end_header\n`,
+  );
+  const stride = colored ? 15 : 12;
+  const file = Buffer.alloc(header.length + points * stride);
+  header.copy(file);
+  let state = 1;
+  const random = () => (state = (Math.imul(state, 1664525) + 1013904223) >>> 0) / 2 ** 32;
+  for (let i = 0, at = header.length; i < points; i++, at += stride) {
+    const z = 2 * random() - 1;
+    const turn = 2 * Math.PI * random();
+    const ring = Math.sqrt(1 - z * z);
+    file.writeFloatLE(ring * Math.cos(turn), at);
+    file.writeFloatLE(ring * Math.sin(turn), at + 4);
+    file.writeFloatLE(z, at + 8);
+    if (colored) file.set([255 * (i % 2), 96, 160], at + 12);
+  }
+  return file;
+}
+
+/** Drops a file onto the middle of the window. */
+export async function drop(page, name, bytes) {
+  const transfer = await page.evaluateHandle(
+    ([name, text]) => {
+      const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+      const transfer = new DataTransfer();
+      transfer.items.add(new File([bytes], name));
+      return transfer;
+    },
+    [name, Buffer.from(bytes).toString('base64')],
+  );
+  await page.dispatchEvent('body', 'drop', { dataTransfer: transfer });
+}
+
+/** Gives a file to the hidden input, as the browser does after a choice; for files too large to drop from a test. */
+export function choose(page, name, buffer) {
+  return page.locator('#file').setInputFiles({ name, mimeType: 'application/octet-stream', buffer });
+}
+
+/** Waits until the normals of the named scan are on the screen, and returns what the status line says. */
+export async function result(page, name) {
+  await page.waitForFunction(
+    (name) => {
+      const shown = (selector) => !document.querySelector(selector).hidden;
+      const settled = !shown('#job') && shown('#status') && document.querySelector('#facts').childElementCount > 0;
+      return shown('#error') || (settled && document.querySelector('#name').textContent === name);
+    },
+    name,
+    { timeout: 120_000 },
+  );
+  return page.evaluate(() => {
+    const text = (selector) => document.querySelector(selector).textContent.trim();
+    const facts = [...document.querySelectorAll('#facts li')].map((item) => item.textContent.split(' '));
+    const numbers = facts.map(([value, name]) => [name.replace(/[^a-z]/g, ''), Number(value.replaceAll(',', ''))]);
+    return {
+      headline: text('.headline'),
+      error: document.querySelector('#error').hidden ? undefined : text('#error p'),
+      fallback: document.querySelector('#fallback').hidden ? undefined : text('#fallback'),
+      mode: document.querySelector('#facts').dataset.mode,
+      phases: [...document.querySelectorAll('#phases dt')].map((phase) => phase.textContent),
+      ...Object.fromEntries(numbers),
+    };
+  });
+}
+
+/** The bytes that "Save as PLY" downloads, and the name it gives them. */
+export async function save(page) {
+  const [download] = await Promise.all([
+    page.waitForEvent('download'),
+    page.getByRole('button', { name: 'Save as PLY' }).click(),
+  ]);
+  return { name: download.suggestedFilename(), bytes: readFileSync(await download.path()) };
+}
+
+/** Once nothing is left to draw: the distinct colours, in steps of 8, in a square in the middle of a view. */
+export async function colorsShown(page, { x = 498, y = 400, side = 200 } = {}) {
+  await page.waitForTimeout(600);
+  const clip = { x: x - side / 2, y: y - side / 2, width: side, height: side };
+  const shot = await page.screenshot({ clip });
+  const colors = await page.evaluate(async (text) => {
+    const image = new Image();
+    image.src = `data:image/png;base64,${text}`;
+    await image.decode();
+    const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+    context.drawImage(image, 0, 0);
+    const { data } = context.getImageData(0, 0, image.width, image.height);
+    const found = new Set();
+    for (let i = 0; i < data.length; i += 4) found.add(((data[i] >> 3) << 10) | ((data[i + 1] >> 3) << 5) | (data[i + 2] >> 3));
+    return [...found];
+  }, shot.toString('base64'));
+  return colors.length;
+}

@@ -1,0 +1,294 @@
+// The page in a real browser, from a dropped file to a saved one.
+
+import assert from 'node:assert/strict';
+import { existsSync, readFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { after, afterEach, before, test } from 'node:test';
+import { gunzipSync } from 'node:zlib';
+import { root } from '../../scripts/run.mjs';
+import { ARTEFACTS, choose, colorsShown, drop, openBrowser, result, save, spherePly } from './browser.mjs';
+
+const SCANS = join(root, '..', 'shared', 'data', 'scans');
+let browser;
+let page;
+
+before(async () => {
+  browser = await openBrowser();
+});
+after(() => browser?.close());
+afterEach(async () => {
+  await page?.close();
+  page = undefined;
+  assert.deepEqual(browser.surprises(), []);
+});
+
+/** Positions and normals of a PLY that the page has saved from `spherePly`. */
+function readSaved(bytes) {
+  const start = bytes.indexOf('end_header\n') + 'end_header\n'.length;
+  const header = bytes.toString('latin1', 0, start);
+  assert.deepEqual(
+    [...header.matchAll(/property (\w+ \w+)/g)].map(([, property]) => property),
+    ['x', 'y', 'z', 'nx', 'ny', 'nz'].map((name) => `float ${name}`),
+  );
+  const values = new Float32Array(bytes.buffer.slice(bytes.byteOffset + start, bytes.byteOffset + bytes.length));
+  assert.equal(values.length, 6 * Number(header.match(/element vertex (\d+)/)[1]));
+  return values;
+}
+
+/** From now on the page presses a button (`data-do`) as soon as the title of the job begins with `title`. */
+function pressWhen(title, action) {
+  return page.evaluate(
+    ([title, action]) => {
+      const job = document.querySelector('#job-title');
+      const observer = new MutationObserver(() => {
+        if (!job.textContent.startsWith(title)) return;
+        observer.disconnect();
+        if (action === 'Escape') dispatchEvent(new KeyboardEvent('keydown', { key: 'Escape' }));
+        else document.querySelector(`[data-do=${action}]`).click();
+      });
+      observer.observe(job, { childList: true, characterData: true, subtree: true });
+    },
+    [title, action],
+  );
+}
+
+test('a dropped scan gets its normals by threads and is shaded', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'ball.ply', spherePly(60_000));
+  const shown = await result(page, 'ball.ply');
+  assert.equal(shown.error, undefined);
+  assert.match(shown.headline, /^[\d.]+ m?s for 60,000 points$/);
+  assert.equal(shown.mode, 'threads');
+  assert.equal(shown.fallback, undefined);
+  assert.ok(shown.cubes > 5_000 && shown.nodes > 5_000 && shown.nodes <= shown.cubes, JSON.stringify(shown));
+  assert.equal(shown.unresolved, 0);
+  assert.ok(shown.phases.length > 2 && shown.phases.includes('reading the file'), String(shown.phases));
+
+  const shaded = await colorsShown(page, { side: 300 });
+  await page.screenshot({ path: join(ARTEFACTS, 'ball-shaded.png') });
+  await page.getByText('Plain', { exact: true }).click();
+  const plain = await colorsShown(page, { side: 300 });
+  await page.getByText('Normals', { exact: true }).click();
+  const normals = await colorsShown(page, { side: 300 });
+  assert.ok(shaded > plain && normals > 2 * shaded, `colours shaded ${shaded}, plain ${plain}, normals ${normals}`);
+  assert.ok(await page.getByRole('radio', { name: 'Colours' }).isDisabled(), 'the file has no colours');
+});
+
+test('the saved file holds right normals, the same bits with threads and without', async () => {
+  const saved = {};
+  for (const kind of ['isolated', 'plain']) {
+    page = await browser.openPage(browser[kind]);
+    await drop(page, 'ball.one.ply', spherePly(60_000));
+    const shown = await result(page, 'ball.one.ply');
+    assert.equal(shown.mode, kind === 'isolated' ? 'threads' : 'single', shown.fallback);
+    if (kind === 'plain') {
+      assert.equal(shown.thread, 1);
+      assert.match(shown.fallback, /^One thread: .*isolat/i);
+    }
+    saved[kind] = await save(page);
+    await page.close();
+  }
+  assert.equal(saved.isolated.name, 'ball.one-normals.ply');
+  assert.ok(saved.isolated.bytes.equals(saved.plain.bytes), 'the two builds differ');
+  const values = readSaved(saved.isolated.bytes);
+  for (let i = 0; i < values.length; i += 6) {
+    const [x, y, z, nx, ny, nz] = values.subarray(i, i + 6);
+    // The position is the true normal of the unit sphere: within 3 degrees.
+    assert.ok(Math.abs(x * nx + y * ny + z * nz) > 0.9986, `point ${i / 6}: ${[x, y, z]} has normal ${[nx, ny, nz]}`);
+  }
+});
+
+test('a job can be cancelled while it reads and while it computes, and the next one works', async () => {
+  page = await browser.openPage(browser.isolated);
+  const large = spherePly(1_000_000);
+  await pressWhen('Reading', 'cancel');
+  await choose(page, 'large.ply', large);
+  await page.locator('#start').waitFor();
+  assert.ok(await page.locator('#error').isHidden(), 'to cancel is no error');
+
+  await pressWhen('Computing', 'Escape');
+  await choose(page, 'large.ply', large);
+  await page.getByText('1,000,000 points, without normals').waitFor();
+  await page.locator('#job').waitFor({ state: 'hidden' });
+  assert.ok(await page.getByRole('button', { name: 'Save as PLY' }).isDisabled());
+  await page.getByRole('button', { name: 'Compute' }).click();
+  assert.match((await result(page, 'large.ply')).headline, /1,000,000 points/);
+
+  await drop(page, 'small.ply', spherePly(5_000));
+  assert.match((await result(page, 'small.ply')).headline, /5,000 points/);
+});
+
+test('a file dropped while another is worked on takes its place', async () => {
+  page = await browser.openPage(browser.isolated);
+  await choose(page, 'large.ply', spherePly(1_000_000));
+  await drop(page, 'small.ply', spherePly(5_000));
+  assert.match((await result(page, 'small.ply')).headline, /5,000 points/);
+  await page.waitForTimeout(1000);
+  assert.equal(await page.locator('#name').textContent(), 'small.ply');
+});
+
+test('a bad file gives a message that can be read, and the cloud before stays', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'photo.ply', Buffer.from('GIF89a, not a scan'));
+  const alert = page.getByRole('alert').filter({ hasText: 'photo.ply' });
+  await alert.waitFor();
+  assert.match(await alert.textContent(), /photo\.ply: .*ply/);
+  assert.ok(await page.locator('#start').isVisible());
+
+  await drop(page, 'ball.ply', spherePly(5_000));
+  const before = await result(page, 'ball.ply');
+  assert.equal(before.error, undefined, 'a new file clears the message');
+  await drop(page, 'short.ply', spherePly(5_000).subarray(0, 30_000));
+  await page.getByRole('alert').filter({ hasText: 'short.ply' }).waitFor();
+  const { error, ...after } = await result(page, 'ball.ply');
+  assert.match(error, /^short\.ply: ./);
+  assert.deepEqual({ ...after, error: undefined }, before);
+  await page.getByRole('button', { name: 'Dismiss the message' }).click();
+  assert.ok(await page.locator('#error').isHidden());
+});
+
+test('a keyboard alone opens a file', async () => {
+  page = await browser.openPage(browser.isolated);
+  const focused = () => page.evaluate(() => document.activeElement.textContent.trim());
+  for (let presses = 0; (await focused()) !== 'Choose a PLY file'; presses++) {
+    assert.ok(presses < 5, 'the button is not reached by Tab');
+    await page.keyboard.press('Tab');
+  }
+  const [chooser] = await Promise.all([page.waitForEvent('filechooser'), page.keyboard.press('Enter')]);
+  await chooser.setFiles({ name: 'ball.ply', mimeType: '', buffer: spherePly(5_000) });
+  await result(page, 'ball.ply');
+});
+
+test('another cell, after a number that cannot be one', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'ball.ply', spherePly(60_000));
+  const auto = await result(page, 'ball.ply');
+  await page.getByText('× L', { exact: true }).click();
+  const field = page.getByRole('textbox', { name: 'multiples of L' });
+  const again = page.getByRole('button', { name: 'Re-run' });
+  await field.fill('-1');
+  assert.equal(await field.getAttribute('aria-invalid'), 'true');
+  assert.match(await page.locator('#cell-problem').textContent(), /0\.1 to 100/);
+  assert.ok(await again.isDisabled());
+  await field.fill('3');
+  await again.click();
+  await page.waitForFunction((cubes) => !document.querySelector('#facts').textContent.includes(cubes), auto.cubes.toLocaleString('en'));
+  const coarse = await result(page, 'ball.ply');
+  assert.ok(coarse.cubes < auto.cubes / 2, `${coarse.cubes} cubes after ${auto.cubes}`);
+
+  await page.getByText('Edge', { exact: true }).click();
+  await page.getByRole('textbox', { name: 'unit of the file' }).fill('0.05');
+  await page.keyboard.press('Enter');
+  await page.waitForFunction(() => document.querySelector('#facts').textContent.includes('0.05 edge'));
+});
+
+test('the sample loads by its address, with colours, and can be turned', async () => {
+  page = await browser.openPage(`${browser.isolated}?sample`);
+  const shown = await result(page, 'sample.ply');
+  assert.match(shown.headline, /500,000 points/);
+  const front = await colorsShown(page);
+  await page.screenshot({ path: join(ARTEFACTS, 'sample-shaded.png') });
+  await page.getByText('Normals', { exact: true }).click();
+  assert.ok((await colorsShown(page)) > 2 * front);
+  await page.screenshot({ path: join(ARTEFACTS, 'sample-normals.png') });
+  await page.getByText('Colours', { exact: true }).click();
+  await colorsShown(page);
+  await page.screenshot({ path: join(ARTEFACTS, 'sample-colours.png') });
+  await page.mouse.move(400, 400);
+  const still = await page.screenshot();
+  await page.mouse.down();
+  await page.mouse.move(600, 300, { steps: 3 });
+  await page.mouse.up();
+  await colorsShown(page);
+  assert.ok(!still.equals(await page.screenshot()), 'a drag turns the cloud');
+});
+
+test('nothing can be sent to another host', async () => {
+  page = await browser.openPage(browser.isolated);
+  const elsewhere = browser.plain;
+  const outcome = await page.evaluate(async (elsewhere) => {
+    const broken = [];
+    addEventListener('securitypolicyviolation', (event) => broken.push(event.effectiveDirective));
+    const fetched = await fetch(elsewhere, { mode: 'no-cors' }).then(
+      () => 'sent',
+      () => 'refused',
+    );
+    const beacon = new Image();
+    const imaged = await new Promise((settle) => {
+      beacon.onload = () => settle('sent');
+      beacon.onerror = () => settle('refused');
+      beacon.src = `${elsewhere}beacon.png`;
+    });
+    return { fetched, imaged, broken: broken.sort() };
+  }, elsewhere);
+  assert.deepEqual(outcome, { fetched: 'refused', imaged: 'refused', broken: ['connect-src', 'img-src'] });
+  // Both attempts are in the console; neither is a request.
+  const surprises = browser.surprises();
+  assert.ok(surprises.length > 0 && surprises.every((text) => text.startsWith('console: ')), surprises.join('\n'));
+});
+
+test('a narrow screen shows everything without scrolling sideways', async () => {
+  page = await browser.openPage(browser.isolated, { viewport: { width: 360, height: 640 }, hasTouch: true });
+  const inside = () =>
+    page.evaluate(() => {
+      const boxes = [...document.querySelectorAll('button, input, label, p, summary, li')].filter((e) => e.checkVisibility());
+      const out = boxes.filter((element) => element.getBoundingClientRect().right > innerWidth || element.getBoundingClientRect().left < 0);
+      return { width: document.documentElement.scrollWidth, out: out.map((element) => element.outerHTML.slice(0, 80)) };
+    });
+  assert.deepEqual(await inside(), { width: 360, out: [] });
+  await page.screenshot({ path: join(ARTEFACTS, 'narrow-start.png') });
+  await page.getByRole('button', { name: 'Try the sample' }).tap();
+  await result(page, 'sample.ply');
+  await colorsShown(page, { x: 180, y: 300 });
+  await page.screenshot({ path: join(ARTEFACTS, 'narrow-sample.png') });
+  await page.locator('#panel > summary').tap();
+  await page.getByRole('button', { name: 'Save as PLY' }).waitFor();
+  assert.deepEqual(await inside(), { width: 360, out: [] });
+  await page.screenshot({ path: join(ARTEFACTS, 'narrow-panel.png') });
+});
+
+test('frames keep coming while the normals of a million points are computed', async () => {
+  page = await browser.openPage(browser.isolated);
+  await choose(page, 'large.ply', spherePly(1_000_000));
+  await result(page, 'large.ply');
+  await colorsShown(page);
+  await page.evaluate(() => {
+    window.frames_during_work = 0;
+    const count = () => {
+      if (!document.querySelector('#job').hidden) window.frames_during_work++;
+      requestAnimationFrame(count);
+    };
+    requestAnimationFrame(count);
+  });
+  for (let run = 1; run <= 3; run++) {
+    await page.getByRole('button', { name: 'Re-run' }).click();
+    await result(page, 'large.ply');
+  }
+  const frames = await page.evaluate(() => window.frames_during_work);
+  assert.ok(frames >= 6, `${frames} frames in three runs`);
+});
+
+test('a browser without WebGL 2 is told so', async () => {
+  page = await browser.openPage(browser.isolated, {
+    script: () => {
+      const original = HTMLCanvasElement.prototype.getContext;
+      HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+        return kind === 'webgl2' ? null : original.call(this, kind, ...rest);
+      };
+    },
+  });
+  await page.getByRole('alert').filter({ hasText: 'WebGL 2' }).waitFor();
+  assert.ok(await page.getByRole('button', { name: 'Choose a PLY file' }).isDisabled());
+});
+
+const AERIAL = join(SCANS, 'las_ahn3_cropped.ply.gz');
+test('a real aerial scan of 849 thousand points', { skip: !existsSync(AERIAL) && 'no ../shared/data' }, async () => {
+  page = await browser.openPage(browser.isolated);
+  await choose(page, 'aerial.ply', gunzipSync(readFileSync(AERIAL)));
+  const shown = await result(page, 'aerial.ply');
+  assert.equal(shown.error, undefined);
+  assert.match(shown.headline, /848,942 points/);
+  assert.ok(await page.getByRole('radio', { name: 'Z', exact: true }).isChecked(), 'surveys are z-up');
+  assert.ok((await colorsShown(page)) > 20);
+  await page.screenshot({ path: join(ARTEFACTS, 'aerial-shaded.png') });
+});

@@ -1,0 +1,21 @@
+// Numbers and phase names as a person reads them.
+
+const whole = new Intl.NumberFormat('en');
+
+export const count = (value: number) => whole.format(value);
+
+/** Three significant digits, without an exponent where that stays readable. */
+export function measure(value: number): string {
+  if (value === 0) return '0';
+  const size = Math.abs(value);
+  return size >= 1e-4 && size < 1e7 ? String(Number(value.toPrecision(3))) : value.toExponential(2);
+}
+
+export function duration(milliseconds: number): string {
+  if (milliseconds < 10) return `${milliseconds.toFixed(1)} ms`;
+  if (milliseconds < 1000) return `${Math.round(milliseconds)} ms`;
+  return `${(milliseconds / 1000).toFixed(milliseconds < 10_000 ? 2 : 1)} s`;
+}
+
+/** "10 points", "1 point". */
+export const plural = (value: number, noun: string) => `${count(value)} ${noun}${value === 1 ? '' : 's'}`;

@@ -1,0 +1,121 @@
+// Puts the page together: what a person does goes to the session and the state, what the state says goes to the view.
+import { drawHero } from './hero';
+import { element, showState } from './panel';
+import { createSession, type Session } from './session';
+import { createStore, type CellKind, type Store } from './state';
+import { missing } from './support';
+import { createViewer, type Margins, type Shading, type Up, type Viewer } from './viewer';
+
+const store = createStore();
+drawHero(element('#hero'));
+showState(store);
+
+const unsupported = await missing();
+if (unsupported === undefined) start(createViewer(element('#canvas')));
+else store.set({ unsupported });
+
+function start(viewer: Viewer): void {
+  const session = createSession(store, viewer);
+  const input = element<HTMLInputElement>('#file');
+  const small = matchMedia('(max-width: 640px)');
+
+  const actions: Record<string, () => void> = {
+    choose: () => input.click(),
+    sample: () => void session.openSample(),
+    fit: () => viewer.fit(),
+    save: () => void session.save(),
+    cancel: () => session.cancel(),
+    dismiss: () => store.set({ error: undefined }),
+  };
+  for (const button of document.querySelectorAll<HTMLButtonElement>('[data-do]')) {
+    button.addEventListener('click', actions[button.dataset['do']!]!);
+  }
+  input.addEventListener('change', () => {
+    const file = input.files?.[0];
+    if (file) void session.open(file);
+    // The same file chosen again is a change again.
+    input.value = '';
+  });
+  addEventListener('keydown', (event) => {
+    if (event.key === 'Escape' && store.state.job) session.cancel();
+    const typing = event.target instanceof HTMLInputElement && event.target.type === 'text';
+    if (event.key === 'f' && !typing && !event.ctrlKey && !event.metaKey && !event.altKey) viewer.fit();
+  });
+
+  takeDrops(session);
+  takeControls(session, viewer);
+
+  // On a small screen the panel would hide the cloud: it starts closed there.
+  element<HTMLDetailsElement>('#panel').open = !small.matches;
+  small.addEventListener('change', () => viewer.setMargins(marginsOf(small)));
+  let named: string | undefined;
+  store.listen(({ scan }) => {
+    if (scan?.name !== named) viewer.setMargins(marginsOf(small));
+    named = scan?.name;
+  });
+
+  if (new URLSearchParams(location.search).has('sample')) void session.openSample();
+}
+
+/** What the panel and the status line cover: the right edge, or on a small screen top and bottom. */
+function marginsOf(small: MediaQueryList): Margins {
+  const { offsetWidth: width, offsetTop: gap } = element('#panel');
+  if (!small.matches) return { top: 0, right: width + gap, bottom: 0 };
+  return { top: element('#panel > summary').offsetHeight + gap, right: 0, bottom: 150 };
+}
+
+/** Files dropped anywhere on the window. */
+function takeDrops(session: Session): void {
+  const carriesFiles = (event: DragEvent) => event.dataTransfer?.types.includes('Files') ?? false;
+  const target = document.documentElement;
+  addEventListener('dragover', (event) => {
+    event.preventDefault();
+    target.classList.toggle('dropping', carriesFiles(event));
+  });
+  addEventListener('dragleave', (event) => {
+    if (event.relatedTarget === null) target.classList.remove('dropping');
+  });
+  addEventListener('drop', (event) => {
+    event.preventDefault();
+    target.classList.remove('dropping');
+    const file = event.dataTransfer?.files[0];
+    if (file) void session.open(file);
+    else store.set({ error: 'That was not a file: drop a .ply file from a folder of this machine.' });
+  });
+}
+
+/** The panel's controls: each writes the state, and the viewer follows the state. */
+function takeControls(session: Session, viewer: Viewer): void {
+  const choose = (name: string, take: (value: string) => void) => {
+    for (const input of document.querySelectorAll<HTMLInputElement>(`input[name="${name}"]`)) {
+      input.addEventListener('change', () => take(input.value));
+    }
+  };
+  choose('shading', (value) => store.set({ shading: value as Shading }));
+  choose('up', (value) => store.set({ up: value as Up }));
+  choose('cell', (value) => chooseCell(store, value as CellKind));
+
+  const size = element<HTMLInputElement>('#point-size');
+  size.addEventListener('input', () => store.set({ pointSize: 2 ** size.valueAsNumber }));
+  const cell = element<HTMLInputElement>('#cell-value');
+  cell.addEventListener('input', () => store.set({ cellText: cell.value }));
+  element<HTMLFormElement>('#cell').addEventListener('submit', (event) => {
+    event.preventDefault();
+    void session.estimate();
+  });
+
+  let before = store.state;
+  store.listen((state) => {
+    if (state.shading !== before.shading) viewer.setShading(state.shading);
+    if (state.up !== before.up) viewer.setUp(state.up);
+    if (state.pointSize !== before.pointSize) viewer.setPointSize(state.pointSize);
+    before = state;
+  });
+}
+
+/** A new way to give the cell starts from the one that was just used. */
+function chooseCell(to: Store, cellKind: CellKind): void {
+  const { report } = to.state;
+  const used = cellKind === 'scale' ? (report?.scale ?? 1) : report?.cellSize;
+  to.set({ cellKind, cellText: used === undefined ? '' : String(Number(used.toPrecision(3))) });
+}

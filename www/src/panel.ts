@@ -1,0 +1,134 @@
+// Draws the state into the document. Nothing is remembered here: every part is a function of the state.
+import type { Report } from 'bilinormal';
+import { parseCell } from './cell';
+import { count, duration, measure, plural } from './format';
+import type { Scan, State, Store } from './state';
+
+export function element<T extends HTMLElement>(selector: string): T {
+  const found = document.querySelector<T>(selector);
+  if (!found) throw new Error(`index.html has no ${selector}`);
+  return found;
+}
+
+const make = (tag: string, text: string, className = '') =>
+  Object.assign(document.createElement(tag), { textContent: text, className });
+
+function fact(value: string, name: string): HTMLElement {
+  const item = make('li', ` ${name}`);
+  item.prepend(make('b', value));
+  return item;
+}
+
+export function showState(store: Store): void {
+  const start = element('#start');
+  const panel = element<HTMLDetailsElement>('#panel');
+  const unsupported = element('#unsupported');
+  let drawn: State | undefined;
+
+  store.listen((state) => {
+    const before = drawn;
+    drawn = state;
+    const { scan, report, job, error } = state;
+    const busy = job !== undefined;
+
+    start.hidden = busy || scan !== undefined;
+    panel.hidden = scan === undefined;
+    unsupported.hidden = state.unsupported === undefined;
+    unsupported.textContent = state.unsupported ?? '';
+    for (const button of document.querySelectorAll<HTMLButtonElement>('[data-do=choose], [data-do=sample]')) {
+      button.disabled = state.unsupported !== undefined;
+    }
+
+    element('#name').textContent = scan?.name ?? 'bilinormal';
+    check('shading', state.shading);
+    check('up', state.up);
+    radio('shading', 'colors').disabled = !scan?.hasColors;
+    radio('shading', 'shaded').disabled = radio('shading', 'normals').disabled = !scan?.hasNormals && !busy;
+    element<HTMLButtonElement>('[data-do=save]').disabled = !scan?.hasNormals || busy;
+
+    showCell(state, busy);
+    showError(error);
+    showJob(state);
+    if (before?.scan !== scan || before?.report !== report) showResult(scan, report);
+  });
+}
+
+const radio = (name: string, value: string) =>
+  element<HTMLInputElement>(`input[name="${name}"][value="${value}"]`);
+
+function check(name: string, value: string): void {
+  radio(name, value).checked = true;
+}
+
+function showCell({ cellKind, cellText, scan }: State, busy: boolean): void {
+  check('cell', cellKind);
+  const input = element<HTMLInputElement>('#cell-value');
+  input.hidden = cellKind === 'auto';
+  input.ariaLabel = cellKind === 'scale' ? 'Cell edge in multiples of L' : 'Cell edge in the unit of the file';
+  if (input.value !== cellText) input.value = cellText;
+  const choice = parseCell(cellKind, cellText);
+  const problem = 'problem' in choice ? choice.problem : '';
+  input.ariaInvalid = String(problem !== '');
+  const note = element('#cell-problem');
+  note.hidden = problem === '';
+  note.textContent = problem;
+  const again = element<HTMLButtonElement>('#again');
+  again.disabled = busy || problem !== '';
+  again.textContent = scan?.hasNormals ? 'Re-run' : 'Compute';
+}
+
+function showError(error: string | undefined): void {
+  const box = element('#error');
+  box.hidden = error === undefined;
+  element('#error p').textContent = error ?? '';
+}
+
+function showJob({ job }: State): void {
+  element('#job').hidden = job === undefined;
+  if (!job) return;
+  element('#job-title').textContent = job.title;
+  element('#job-phase').textContent = job.phase;
+  const bar = element<HTMLProgressElement>('#job progress');
+  if (job.fraction === undefined) bar.removeAttribute('value');
+  else bar.value = job.fraction;
+}
+
+function showResult(scan: Scan | undefined, report: Report | undefined): void {
+  element('#status').hidden = scan === undefined;
+  if (!scan) return;
+  element('#total').textContent = report ? duration(report.milliseconds.total) : count(scan.points);
+  element('#total-label').textContent = report
+    ? `for ${plural(report.points, 'point')}`
+    : 'points, without normals';
+
+  const facts = element('#facts');
+  facts.replaceChildren();
+  const fallback = element('#fallback');
+  fallback.hidden = !report?.fallbackReason;
+  fallback.textContent = report?.fallbackReason ? `One thread: ${report.fallbackReason}` : '';
+  element('#status details').hidden = report === undefined;
+  if (!report) return;
+
+  facts.append(
+    fact(count(report.cells), 'cubes'),
+    fact(count(report.nodes), 'nodes'),
+    fact(count(report.unresolved), 'unresolved'),
+    fact(measure(report.cellSize), `edge, ${measure(report.scale)} L`),
+    fact(count(report.threads), report.threads === 1 ? 'thread' : 'threads'),
+  );
+  facts.dataset['mode'] = report.mode;
+
+  const phases = Object.entries(report.milliseconds).filter(([phase]) => phase !== 'total');
+  const bar = element('#status .bar');
+  const list = element('#phases');
+  bar.replaceChildren();
+  list.replaceChildren();
+  for (const [phase, milliseconds] of phases) {
+    const part = make('span', '');
+    part.style.flexGrow = String(milliseconds);
+    part.title = `${phase}: ${duration(milliseconds)}`;
+    bar.append(part);
+    list.append(make('dt', phase), make('dd', duration(milliseconds)));
+  }
+  list.append(make('dt', 'reading the file', 'apart'), make('dd', duration(scan.readMilliseconds), 'apart'));
+}

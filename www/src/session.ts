@@ -1,0 +1,144 @@
+// What a person can have done, as one flow: file -> readPointCloud -> viewer.show -> estimateNormals ->
+// viewer.setNormals -> report. One job runs at a time; a new one cancels it.
+import { estimateNormals, readPointCloud, writePly } from 'bilinormal';
+import { boundsOf, guessUp } from './bounds';
+import { parseCell } from './cell';
+import type { Store } from './state';
+import type { Viewer } from './viewer';
+
+export interface Session {
+  open(file: File): Promise<void>;
+  openSample(): Promise<void>;
+  /** Computes the normals of the cloud on the screen again, with the cell that is set now. */
+  estimate(): Promise<void>;
+  save(): Promise<void>;
+  cancel(): void;
+}
+
+const SAMPLE_POINTS = 500_000;
+
+interface Step {
+  signal: AbortSignal;
+  /** Names what runs now; returns the receiver of its progress. */
+  begin(title: string): (progress: { phase: string; fraction: number }) => void;
+}
+
+export function createSession(store: Store, viewer: Viewer): Session {
+  let current: AbortController | undefined;
+  let shown: { file: File; positions: Float32Array; normals?: Float32Array } | undefined;
+
+  /** Runs one job to its end; what it throws becomes the message on the page, unless it was cancelled. */
+  async function run(trouble: string, work: (step: Step) => Promise<void>): Promise<void> {
+    current?.abort();
+    const mine = new AbortController();
+    current = mine;
+    const tell = (title: string, phase: string, fraction: number | undefined) => {
+      if (current === mine) store.set({ job: { title, phase, fraction } });
+    };
+    store.set({ error: undefined });
+    try {
+      await work({
+        signal: mine.signal,
+        begin(title) {
+          tell(title, '', undefined);
+          return ({ phase, fraction }) => tell(title, phase, fraction);
+        },
+      });
+    } catch (error) {
+      if (!mine.signal.aborted) store.set({ error: `${trouble}: ${messageOf(error)}` });
+    }
+    if (current === mine) {
+      current = undefined;
+      store.set({ job: undefined });
+    }
+  }
+
+  async function show(file: File, step: Step): Promise<void> {
+    const started = performance.now();
+    const cloud = await readPointCloud(file, { signal: step.signal, onProgress: step.begin(`Reading ${file.name}`) });
+    step.signal.throwIfAborted();
+    if (cloud.count === 0) throw new Error('the file holds no points');
+    const readMilliseconds = performance.now() - started;
+    const bounds = boundsOf(cloud.positions);
+    const up = guessUp(bounds, cloud.origin);
+    const hasColors = cloud.colors !== undefined;
+    const shading = store.state.shading === 'colors' && !hasColors ? 'shaded' : store.state.shading;
+    shown = { file, positions: cloud.positions };
+    viewer.show(cloud, bounds, up);
+    const scan = { name: file.name, points: cloud.count, hasColors, hasNormals: false, readMilliseconds };
+    // An edge length belongs to the unit of the file before.
+    store.set({ scan, report: undefined, up, shading, cellKind: 'auto', cellText: '' });
+  }
+
+  async function shade(step: Step): Promise<void> {
+    const { scan, cellKind, cellText } = store.state;
+    const choice = parseCell(cellKind, cellText);
+    if (!shown || !scan) return;
+    if ('problem' in choice) throw new Error(choice.problem);
+    const { normals, report } = await estimateNormals(shown.positions, {
+      cell: choice.cell,
+      signal: step.signal,
+      onProgress: step.begin('Computing normals'),
+    });
+    step.signal.throwIfAborted();
+    shown.normals = normals;
+    viewer.setNormals(normals);
+    store.set({ scan: { ...scan, hasNormals: true }, report });
+  }
+
+  return {
+    open: (file) =>
+      run(file.name, async (step) => {
+        await show(file, step);
+        await shade(step);
+      }),
+
+    openSample: () =>
+      run('The sample', async (step) => {
+        step.begin('Making the sample');
+        await show(await makeSample(step.signal), step);
+        await shade(step);
+      }),
+
+    estimate: () => run('Computing normals', shade),
+
+    save: () =>
+      run('Saving', async (step) => {
+        if (!shown?.normals) return;
+        step.begin('Saving');
+        const { file, normals } = shown;
+        const ply = await writePly(file, { normals });
+        step.signal.throwIfAborted();
+        download(ply, `${file.name.replace(/\.[^.]*$/, '')}-normals.ply`);
+      }),
+
+    cancel() {
+      current?.abort();
+      current = undefined;
+      store.set({ job: undefined });
+    },
+  };
+}
+
+function makeSample(signal: AbortSignal): Promise<File> {
+  const worker = new Worker(new URL('./sample.worker.ts', import.meta.url), { type: 'module' });
+  return new Promise<File>((resolve, reject) => {
+    signal.addEventListener('abort', () => reject(signal.reason));
+    worker.onmessage = ({ data }: MessageEvent<Uint8Array<ArrayBuffer>>) => resolve(new File([data], 'sample.ply'));
+    worker.onerror = () => reject(new Error('the worker that makes the sample did not start'));
+    worker.postMessage({ points: SAMPLE_POINTS });
+  }).finally(() => worker.terminate());
+}
+
+function download(blob: Blob, name: string): void {
+  const link = document.createElement('a');
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  // The browser has to get hold of the data first.
+  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+}
+
+function messageOf(error: unknown): string {
+  return error instanceof Error ? error.message : String(error);
+}

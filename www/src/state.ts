@@ -1,0 +1,72 @@
+// Everything the page shows besides the cloud itself, in one place. The session and the controls write it, `set` tells
+// the listeners, and the panel draws it: nothing reads the document to find out what is going on.
+import type { Report } from 'bilinormal';
+import type { Shading, Up } from './viewer';
+
+export type CellKind = 'auto' | 'scale' | 'size';
+
+/** The cloud on the screen. */
+export interface Scan {
+  name: string;
+  points: number;
+  hasColors: boolean;
+  hasNormals: boolean;
+  readMilliseconds: number;
+}
+
+/** The work under way. `fraction` is undefined where the work cannot tell how far it is. */
+export interface Job {
+  title: string;
+  phase: string;
+  fraction: number | undefined;
+}
+
+export interface State {
+  /** Why this browser cannot run the page at all. */
+  unsupported: string | undefined;
+  scan: Scan | undefined;
+  report: Report | undefined;
+  job: Job | undefined;
+  error: string | undefined;
+  shading: Shading;
+  pointSize: number;
+  up: Up;
+  cellKind: CellKind;
+  /** As typed; `cell.ts` says whether it is a number that can be used. */
+  cellText: string;
+}
+
+export interface Store {
+  readonly state: Readonly<State>;
+  set(change: Partial<State>): void;
+  listen(listener: (state: Readonly<State>) => void): void;
+}
+
+export function createStore(): Store {
+  let state: State = {
+    unsupported: undefined,
+    scan: undefined,
+    report: undefined,
+    job: undefined,
+    error: undefined,
+    shading: 'shaded',
+    pointSize: 1,
+    up: 'y',
+    cellKind: 'auto',
+    cellText: '',
+  };
+  const listeners: ((state: Readonly<State>) => void)[] = [];
+  return {
+    get state() {
+      return state;
+    },
+    set(change) {
+      state = { ...state, ...change };
+      for (const listener of listeners) listener(state);
+    },
+    listen(listener) {
+      listeners.push(listener);
+      listener(state);
+    },
+  };
+}

@@ -1,0 +1,293 @@
+// The view: plain arrays in, pixels on one canvas. It knows nothing of files, wasm or the rest of the page, and it draws
+// only when something has changed.
+import { BufferAttribute, BufferGeometry, Group, PerspectiveCamera, Points, Scene, Sphere, Vector3, WebGLRenderer } from 'three';
+import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
+import { createPointMaterial } from 'bilinormal/three';
+import { boundsOf, type Bounds } from './bounds';
+import { pickPoint } from './pick';
+
+export type Shading = 'shaded' | 'normals' | 'colors' | 'plain';
+export type Up = 'y' | 'z';
+
+export interface Cloud {
+  /** x0 y0 z0 x1 ...; points that are not finite are not drawn. */
+  positions: Float32Array;
+  /** RGBA. */
+  colors?: Uint8Array | undefined;
+}
+
+export interface Viewer {
+  /** Replaces the cloud; it stays unlit until its normals arrive. */
+  show(cloud: Cloud, bounds: Bounds, up: Up): void;
+  setNormals(normals: Float32Array): void;
+  setShading(shading: Shading): void;
+  /** 1 is the size at which the points of a surface just about close it. */
+  setPointSize(size: number): void;
+  setUp(up: Up): void;
+  /** Frames the whole cloud from the first point of view. */
+  fit(): void;
+  /** Pixels at the edges that are covered: the cloud is framed in the rest. */
+  setMargins(margins: Margins): void;
+}
+
+export interface Margins {
+  top: number;
+  right: number;
+  bottom: number;
+}
+
+/** While the camera moves, clouds above this size may be drawn in part, if whole frames take too long. */
+const SPARSE_FROM = 200_000;
+const SPARSE_MOST = 2_000_000;
+const SPARSE_LEAST = 60_000;
+/** Frame times between these two, in milliseconds, leave the number of points as it is. */
+const FAST_FRAME = 20;
+const SLOW_FRAME = 36;
+/** Time without movement after which the whole cloud is drawn. */
+const STILL = 140;
+
+export function createViewer(canvas: HTMLCanvasElement): Viewer {
+  const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
+  const renderer = new WebGLRenderer({ canvas, alpha: true, antialias: false, powerPreference: 'high-performance' });
+  renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+  const camera = new PerspectiveCamera(38, 1, 0.01, 100);
+  camera.position.set(0, 0, 3);
+  const controls = new OrbitControls(camera, canvas);
+  controls.enableDamping = !calm;
+  controls.dampingFactor = 0.12;
+  controls.zoomToCursor = true;
+  controls.listenToKeyEvents(canvas);
+
+  const scene = new Scene();
+  // The world is y-up, with the middle of the cloud at its origin; this turns a z-up cloud into it.
+  const turned = new Group();
+  scene.add(turned);
+  const material = createPointMaterial();
+  const points = new Points(new BufferGeometry(), material);
+  // Bounds come from finite points only; three's own would turn into NaN.
+  points.frustumCulled = false;
+  points.visible = false;
+  turned.add(points);
+
+  let cloud: Cloud | undefined;
+  let bounds: Bounds | undefined;
+  let whole = points.geometry;
+  let sparse: BufferGeometry | undefined;
+  let shading: Shading = 'shaded';
+  let pointSize = 1;
+  let margins: Margins = { top: 0, right: 0, bottom: 0 };
+
+  let frame = 0;
+  let lastFrame = 0;
+  let lastMove = -Infinity;
+  let affordable = SPARSE_MOST;
+
+  function request(): void {
+    if (frame === 0) frame = requestAnimationFrame(draw);
+  }
+
+  function draw(now: number): void {
+    frame = 0;
+    controls.update();
+    const moving = now - lastMove < STILL;
+    if (moving) adapt(now - lastFrame);
+    lastFrame = now;
+    const drawn = moving ? thinOut() : 1;
+    if (!moving) points.geometry = whole;
+    setDepthRange();
+    setSize(drawn);
+    renderer.render(scene, camera);
+    if (moving) request();
+  }
+
+  /** Learns from the time since the last frame how many points this machine draws smoothly. */
+  function adapt(elapsed: number): void {
+    // A longer gap is the start of a movement or a hidden window and says nothing.
+    if (!sparse || elapsed > 400) return;
+    if (elapsed > SLOW_FRAME) affordable = Math.max(SPARSE_LEAST, affordable * 0.75);
+    else if (elapsed < FAST_FRAME) affordable = Math.min(SPARSE_MOST, affordable * 1.08);
+  }
+
+  /** Chooses the geometry of a frame in motion; returns the share of the points that it draws. */
+  function thinOut(): number {
+    const all = cloud ? cloud.positions.length / 3 : 0;
+    if (!sparse || affordable >= all) {
+      points.geometry = whole;
+      return 1;
+    }
+    const some = Math.min(Math.floor(affordable), sparse.index!.count);
+    sparse.setDrawRange(0, some);
+    points.geometry = sparse;
+    return some / all;
+  }
+
+  function setDepthRange(): void {
+    if (!bounds) return;
+    const away = camera.position.length();
+    const focus = camera.position.distanceTo(controls.target);
+    camera.near = Math.max(away - bounds.reach, focus * 0.01, bounds.radius * 1e-4);
+    camera.far = Math.max(away + bounds.reach * 1.01, camera.near * 2);
+    camera.updateProjectionMatrix();
+  }
+
+  /** Size of a point in world units, and larger where a part of the cloud has to stand for the whole. */
+  function setSize(drawn: number): void {
+    if (!cloud || !bounds) return;
+    // The surface of a scan has about as much area as the sphere round it; points without order need 1.6 times the
+    // spacing of an even pattern to close it.
+    const spacing = 1.6 * bounds.radius * Math.sqrt((4 * Math.PI) / Math.max(1, cloud.positions.length / 3));
+    material.size = pointSize * spacing * Math.min(2, Math.sqrt(1 / drawn));
+  }
+
+  function chooseShading(): void {
+    const lit = whole.hasAttribute('normal');
+    const colored = whole.hasAttribute('color');
+    const wanted = lit || shading === 'colors' || shading === 'plain' ? shading : 'colors';
+    material.shading = wanted === 'colors' && !colored ? 'plain' : wanted;
+  }
+
+  function fit(): void {
+    if (!bounds) return;
+    const [x, y, z] = bounds.extent;
+    const box = new Vector3(x, y, z).applyEuler(turned.rotation);
+    const flat = 1 - Math.min(1, Math.abs(box.y) / Math.max(Math.abs(box.x), Math.abs(box.z), Number.MIN_VALUE));
+    const direction = new Vector3(0.5, 0.36 + 0.45 * flat, 1).normalize();
+    const distance = 1.06 * framingDistance(direction, box.multiplyScalar(0.5), bounds.radius);
+    controls.target.set(0, 0, 0);
+    camera.position.copy(direction).multiplyScalar(distance);
+    controls.minDistance = bounds.radius * 1e-3;
+    controls.maxDistance = Math.max(bounds.reach, distance) * 20;
+    controls.update();
+    // A jump, not a movement: draw all of it at once.
+    lastMove = -Infinity;
+    request();
+  }
+
+  /** How far away, looking along `direction`, the box (half edges) or the ball round it just fills the free window. */
+  function framingDistance(direction: Vector3, half: Vector3, radius: number): number {
+    const { clientWidth: width, clientHeight: height } = canvas;
+    const slope = Math.tan((camera.fov * Math.PI) / 360) / height;
+    const across = slope * Math.max(width - margins.right, width / 4);
+    const upright = slope * Math.max(height - margins.top - margins.bottom, height / 4);
+    const right = new Vector3(0, 1, 0).cross(direction).normalize();
+    const above = new Vector3().crossVectors(direction, right);
+    let distance = 0;
+    for (let corner = 0; corner < 8; corner++) {
+      const at = half.clone().multiply(new Vector3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1));
+      const beside = Math.max(Math.abs(at.dot(right)) / across, Math.abs(at.dot(above)) / upright);
+      distance = Math.max(distance, beside + at.dot(direction));
+    }
+    return Math.min(distance || Infinity, radius / Math.sin(Math.atan(Math.min(across, upright))));
+  }
+
+  function resize(): void {
+    const { clientWidth: width, clientHeight: height } = canvas;
+    if (width === 0 || height === 0) return;
+    renderer.setSize(width, height, false);
+    camera.aspect = width / height;
+    // The middle of what is not covered is the middle of the view.
+    camera.setViewOffset(width, height, margins.right / 2, (margins.bottom - margins.top) / 2, width, height);
+    request();
+  }
+
+  function focus(event: MouseEvent): void {
+    if (!cloud) return;
+    const box = canvas.getBoundingClientRect();
+    const x = ((event.clientX - box.left) / box.width) * 2 - 1;
+    const y = 1 - ((event.clientY - box.top) / box.height) * 2;
+    points.updateWorldMatrix(true, false);
+    const eye = points.worldToLocal(camera.position.clone());
+    const along = points.worldToLocal(new Vector3(x, y, 0.5).unproject(camera)).sub(eye).normalize();
+    const slope = (6 / box.height) * 2 * Math.tan((camera.fov * Math.PI) / 360);
+    const index = pickPoint(cloud.positions, eye.toArray(), along.toArray(), slope);
+    if (index < 0) return;
+    controls.target.copy(points.localToWorld(new Vector3().fromArray(cloud.positions, index * 3)));
+    request();
+  }
+
+  controls.addEventListener('change', () => {
+    lastMove = performance.now();
+    request();
+  });
+  canvas.addEventListener('dblclick', focus);
+  canvas.addEventListener('keydown', (event) => {
+    if (event.key === '+' || event.key === '=') controls.dollyIn(1.1);
+    if (event.key === '-') controls.dollyOut(1.1);
+  });
+  canvas.addEventListener('webglcontextrestored', request);
+  new ResizeObserver(resize).observe(canvas);
+
+  const viewer: Viewer = {
+    show(next, nextBounds, up) {
+      whole.dispose();
+      sparse?.dispose();
+      cloud = next;
+      bounds = nextBounds;
+      whole = new BufferGeometry();
+      whole.setAttribute('position', new BufferAttribute(next.positions, 3));
+      if (next.colors) whole.setAttribute('color', new BufferAttribute(next.colors, 4, true));
+      whole.boundingSphere = new Sphere(new Vector3(...bounds.centre), bounds.reach);
+      sparse = undefined;
+      const all = next.positions.length / 3;
+      if (all > SPARSE_FROM) {
+        sparse = new BufferGeometry();
+        for (const [name, attribute] of Object.entries(whole.attributes)) sparse.setAttribute(name, attribute);
+        sparse.setIndex(new BufferAttribute(spread(all, Math.min(all, SPARSE_MOST)), 1));
+        sparse.boundingSphere = whole.boundingSphere;
+      }
+      points.geometry = whole;
+      points.visible = true;
+      points.position.set(-bounds.centre[0], -bounds.centre[1], -bounds.centre[2]);
+      chooseShading();
+      viewer.setUp(up);
+      fit();
+    },
+    setNormals(normals) {
+      const attribute = new BufferAttribute(normals, 3);
+      whole.setAttribute('normal', attribute);
+      sparse?.setAttribute('normal', attribute);
+      chooseShading();
+      request();
+    },
+    setShading(next) {
+      shading = next;
+      chooseShading();
+      request();
+    },
+    setPointSize(next) {
+      pointSize = next;
+      request();
+    },
+    setUp(up) {
+      turned.rotation.x = up === 'z' ? -Math.PI / 2 : 0;
+      request();
+    },
+    fit,
+    setMargins(next) {
+      margins = next;
+      resize();
+    },
+  };
+  return viewer;
+}
+
+/**
+ * The first `count` indices of a fixed order of `all` points in which every beginning is spread evenly over the whole:
+ * steps of the golden ratio. Files are mostly in scan order, so that a plain beginning would be one corner of the scan.
+ */
+function spread(all: number, count: number): Uint32Array {
+  let step = Math.round(all * 0.618034);
+  while (gcd(step, all) !== 1) step++;
+  const order = new Uint32Array(count);
+  for (let i = 0, at = 0; i < count; i++) {
+    order[i] = at;
+    at += step;
+    if (at >= all) at -= all;
+  }
+  return order;
+}
+
+function gcd(a: number, b: number): number {
+  while (b !== 0) [a, b] = [b, a % b];
+  return a;
+}
