@@ -5,6 +5,7 @@ import { createHash } from 'node:crypto';
 import { existsSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { dirname, join, relative } from 'node:path';
 import { gzipSync } from 'node:zlib';
+import { shortenGlue } from './glue.mjs';
 import { Failure, main, root, run, started, tell } from './run.mjs';
 import { setup } from './setup.mjs';
 
@@ -26,7 +27,7 @@ const JAVASCRIPT_LIMIT = 8;
 
 /** Builds what has changed, and then tells the sizes. */
 export function build() {
-  const flags = ['scripts/build.mjs', 'scripts/single.toml', 'scripts/threads.toml'];
+  const flags = ['scripts/build.mjs', 'scripts/glue.mjs', 'scripts/single.toml', 'scripts/threads.toml'];
   const wasmSources = [...filesIn('src', '.rs'), ...flags, 'Cargo.toml', 'Cargo.lock', 'rust-toolchain.toml'];
   const built = Object.keys(WASM).map((name) =>
     once(`dist/${name} by wasm-pack`, wasmSources, [`dist/${name}/bilinormal_bg.wasm`], () => buildWasm(name)),
@@ -76,7 +77,8 @@ function buildWasm(name) {
   const glue = join(folder, 'bilinormal.js');
   writeFileSync(glue, finish(readFileSync(glue, 'utf8')));
   rmSync(join(folder, 'snippets'), { recursive: true, force: true });
-  minify([glue]);
+  shortenGlue(`dist/${name}`);
+  esbuild([`dist/${name}/bilinormal.js`, `--outfile=dist/${name}/bilinormal.js`, '--allow-overwrite']);
 }
 
 /**
@@ -90,18 +92,21 @@ function withOwnPool(glue) {
   return glue.replace(helper, "$1'../pool.js'");
 }
 
+/** The scripts that are imported or started by their own address; every other module goes into those that use it. */
+const SCRIPTS = ['index', 'node', 'link', 'pool', 'worker', 'worker-node', 'thread', 'thread-node', 'three', 'cli'];
+
 function buildJavaScript() {
-  const compiled = () => filesIn('dist', '.js').filter((path) => dirname(path) === 'dist');
   // What an older source left behind must not enter the package.
-  for (const path of compiled()) rmSync(join(root, path));
+  for (const path of filesIn('dist').filter((path) => dirname(path) === 'dist')) rmSync(join(root, path));
   run('tsc', ['--project', '.']);
-  minify(compiled().map((path) => join(root, path)));
+  // `new URL('./worker.js', import.meta.url)` and the imports of glue stay as they are, for browsers and bundlers.
+  const apart = ['./link.js', './pool.js', './node.js', './single/*', './threads/*'].map((path) => `--external:${path}`);
+  const scripts = SCRIPTS.map((name) => `src/js/${name}.ts`);
+  esbuild([...scripts, '--bundle', '--packages=external', ...apart, '--outdir=dist']);
 }
 
-/** File by file, without bundling: a bundler or browser must still see `new URL('./worker.js', import.meta.url)`. */
-function minify(files) {
-  const output = [`--outdir=${root}`, `--outbase=${root}`, '--allow-overwrite', '--log-level=warning'];
-  run('esbuild', [...files, '--minify', '--format=esm', '--target=es2022', ...output]);
+function esbuild(options) {
+  run('esbuild', [...options, '--minify', '--format=esm', '--target=es2022', '--log-level=warning']);
 }
 
 /** What a browser downloads, gzipped. */

@@ -1,5 +1,6 @@
 // The worker's side: takes one call after the other into wasm and hands results out.
-import { BilinormalError, failure } from './error.js';
+import { buffersOf } from './buffers.js';
+import { coded, failure } from './failure.js';
 import { load, type Loaded, type Platform } from './loader.js';
 import type { Bytes, Call, Reply, Start } from './protocol.js';
 import type { Buffer, Tell } from './wasm.js';
@@ -7,11 +8,10 @@ import type { Buffer, Tell } from './wasm.js';
 /** Blobs are read in pieces of this size, so that a file is never whole in JavaScript memory. */
 const pieceBytes = 1 << 23;
 
-type Result = [result: unknown, transfer: Transferable[]];
-
 /** Returns the receiver of messages. */
 export function serve(post: (reply: Reply, transfer: Transferable[]) => void, platform: Platform) {
   let loaded: Promise<Loaded>;
+  let started = false;
   const tell: Tell = (phase, fraction) => post({ phase, fraction }, []);
   return async (message: Start | Call) => {
     if (message.kind === 'start') {
@@ -20,12 +20,11 @@ export function serve(post: (reply: Reply, transfer: Transferable[]) => void, pl
       loaded.catch(() => {});
       return;
     }
-    let started = false;
     try {
       const wasm = await loaded;
       started = true;
-      const [result, transfer] = await answer(message, wasm, platform, tell);
-      post({ result }, transfer);
+      const result = await answer(message, wasm, platform, tell);
+      post({ result }, buffersOf(result));
     } catch (error) {
       const packed = failure(error);
       // After a limit a new worker begins with empty memory; wasm memory never shrinks.
@@ -34,44 +33,40 @@ export function serve(post: (reply: Reply, transfer: Transferable[]) => void, pl
   };
 }
 
-async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Platform, tell: Tell): Promise<Result> {
+async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Platform, tell: Tell): Promise<object> {
   // Made anew for each use: a view of memory that has grown since is empty.
   const view = ({ pointer, byteLength }: Buffer) => new Uint8Array(memory.buffer, pointer, byteLength);
 
-  function put(bytes: Uint8Array): Buffer {
+  function put<T extends Uint8Array | undefined>(bytes: T): Buffer | (T & undefined) {
+    if (!bytes) return bytes as T & undefined;
     const buffer = new glue.Buffer(bytes.byteLength);
     view(buffer).set(bytes);
     return buffer;
   }
-  const putOptional = (bytes?: Uint8Array) => bytes && put(bytes);
 
-  function take(buffer: Buffer): ArrayBuffer {
-    const { buffer: bytes } = view(buffer).slice();
-    buffer.free();
+  function take(buffer?: Buffer): ArrayBuffer | undefined {
+    const bytes = buffer && view(buffer).slice().buffer;
+    buffer?.free();
     return bytes;
   }
 
+  /** Half of the progress. */
   async function putFile(file: Bytes): Promise<Buffer> {
     if (file instanceof Uint8Array) return put(file);
-    const blob = typeof file === 'string' ? openFile(file) : file;
-    const buffer = new glue.Buffer(blob.size);
+    let buffer: Buffer | undefined;
     try {
+      const blob = typeof file === 'string' ? platform.open!(file) : file;
+      buffer = new glue.Buffer(blob.size);
       for (let at = 0; at < blob.size; at += pieceBytes) {
         tell('load', at / blob.size / 2);
         view(buffer).set(new Uint8Array(await blob.slice(at, at + pieceBytes).arrayBuffer()), at);
       }
+      return buffer;
     } catch (error) {
-      buffer.free();
-      throw unreadable(error);
-    }
-    return buffer;
-  }
-
-  function openFile(url: string) {
-    try {
-      return platform.open!(url);
-    } catch (error) {
-      throw unreadable(error);
+      // Without a buffer the file did not open, or memory does not suffice for it.
+      if (!buffer && failure(error).code) throw error;
+      buffer?.free();
+      throw coded('input', `the file could not be read: ${(error as Error).message}`);
     }
   }
 
@@ -85,59 +80,49 @@ async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Plat
     return new Blob(parts, { type: 'application/octet-stream' });
   }
 
-  // A file that was loaded has half of its progress behind it.
-  const tellRest: Tell = (phase, fraction) =>
-    tell(phase, 'file' in call && !(call.file instanceof Uint8Array) ? (1 + fraction) / 2 : fraction);
+  const tellRest: Tell = (phase, fraction) => tell(phase, (1 + fraction) / 2);
 
   switch (call.kind) {
     case 'hello':
-      return [mode, []];
+      return mode;
     case 'estimate': {
       const estimation = glue.estimate(put(call.positions), call.double, call.options, tell);
-      const normals = new Float32Array(take(estimation.takeNormals()));
+      const normals = new Float32Array(take(estimation.takeNormals())!);
       const report = { ...estimation.report, ...mode };
       estimation.free();
-      return [{ normals, report }, [normals.buffer]];
+      return { normals, report };
     }
     case 'read': {
       const cloud = glue.readPly(await putFile(call.file), call.maxPoints, tellRest);
-      const transfer: ArrayBuffer[] = [];
-      const own = (buffer: Buffer) => {
-        const bytes = take(buffer);
-        transfer.push(bytes);
-        return bytes;
-      };
       const { count, origin, format, properties, comments } = cloud;
-      const positions = new Float32Array(own(cloud.takePositions()));
-      const [normals, colors, intensity] = [cloud.takeNormals(), cloud.takeColors(), cloud.takeIntensity()];
-      const result = {
+      const positions = new Float32Array(take(cloud.takePositions())!);
+      const normals = take(cloud.takeNormals());
+      const colors = take(cloud.takeColors());
+      const intensity = take(cloud.takeIntensity());
+      cloud.free();
+      return {
         count,
         positions,
         origin: [...origin],
-        ...(normals && { normals: new Float32Array(own(normals)) }),
-        ...(colors && { colors: new Uint8Array(own(colors)) }),
-        ...(intensity && { intensity: new Float32Array(own(intensity)) }),
+        ...(normals && { normals: new Float32Array(normals) }),
+        ...(colors && { colors: new Uint8Array(colors) }),
+        ...(intensity && { intensity: new Float32Array(intensity) }),
         source: { format, properties, comments },
       };
-      cloud.free();
-      return [result, transfer];
     }
     case 'write': {
       const file = await putFile(call.file);
-      const [normals, curvature] = [putOptional(call.normals), putOptional(call.curvature)];
-      return [takeFile(glue.writePly(file, normals, curvature, call.ascii, tellRest)), []];
+      return takeFile(glue.writePly(file, put(call.normals), put(call.curvature), call.ascii, tellRest));
     }
     case 'writeCloud': {
-      const [positions, normals, colors, intensity, curvature] = [
-        put(call.positions),
-        ...[call.normals, call.colors, call.intensity, call.curvature].map(putOptional),
-      ] as const;
       const { origin, comments, ascii } = call;
-      const file = glue.writeCloud(positions, origin, normals, colors, intensity, curvature, comments, ascii, tell);
-      return [takeFile(file), []];
+      const [positions, ...parts] = [call.positions, call.normals, call.colors, call.intensity, call.curvature].map(
+        put,
+      );
+      const [normals, colors, intensity, curvature] = parts;
+      return takeFile(
+        glue.writeCloud(positions!, origin, normals, colors, intensity, curvature, comments, ascii, tell),
+      );
     }
   }
 }
-
-const unreadable = (error: unknown) =>
-  new BilinormalError('input', `the file could not be read: ${(error as Error).message}`);
