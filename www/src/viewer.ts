@@ -1,12 +1,22 @@
 // The view: plain arrays in, pixels on one canvas. It knows nothing of files, wasm or the rest of the page, and it draws
 // only when something has changed.
-import { BufferAttribute, BufferGeometry, Group, PerspectiveCamera, Points, Scene, Sphere, Vector3, WebGLRenderer } from 'three';
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Group,
+  PerspectiveCamera,
+  Points,
+  Scene,
+  Sphere,
+  Vector3,
+  WebGLRenderer,
+} from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
-import { createPointMaterial } from 'bilinormal/three';
-import { boundsOf, type Bounds } from './bounds';
+import { createPointMaterial, type Shading } from 'bilinormal/three';
+import type { Bounds } from './bounds';
 import { pickPoint } from './pick';
 
-export type Shading = 'shaded' | 'normals' | 'colors' | 'plain';
+export type { Shading };
 export type Up = 'y' | 'z';
 
 export interface Cloud {
@@ -62,7 +72,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   // The world is y-up, with the middle of the cloud at its origin; this turns a z-up cloud into it.
   const turned = new Group();
   scene.add(turned);
-  const material = createPointMaterial();
+  // Warm and with little light on edges, so that form stands out against both backgrounds.
+  const material = createPointMaterial({ color: '#ebe2d3', ambient: 0.02, pixels: 1.5 });
   const points = new Points(new BufferGeometry(), material);
   // Bounds come from finite points only; three's own would turn into NaN.
   points.frustumCulled = false;
@@ -133,9 +144,9 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   /** Size of a point in world units, and larger where a part of the cloud has to stand for the whole. */
   function setSize(drawn: number): void {
     if (!cloud || !bounds) return;
-    // The surface of a scan has about as much area as the sphere round it; points without order need 1.6 times the
+    // The surface of a scan has about as much area as the sphere round it; points without order need 1.8 times the
     // spacing of an even pattern to close it.
-    const spacing = 1.6 * bounds.radius * Math.sqrt((4 * Math.PI) / Math.max(1, cloud.positions.length / 3));
+    const spacing = 1.8 * bounds.radius * Math.sqrt((4 * Math.PI) / Math.max(1, cloud.positions.length / 3));
     material.size = pointSize * spacing * Math.min(2, Math.sqrt(1 / drawn));
   }
 
@@ -197,7 +208,10 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     const y = 1 - ((event.clientY - box.top) / box.height) * 2;
     points.updateWorldMatrix(true, false);
     const eye = points.worldToLocal(camera.position.clone());
-    const along = points.worldToLocal(new Vector3(x, y, 0.5).unproject(camera)).sub(eye).normalize();
+    const along = points
+      .worldToLocal(new Vector3(x, y, 0.5).unproject(camera))
+      .sub(eye)
+      .normalize();
     const slope = (6 / box.height) * 2 * Math.tan((camera.fov * Math.PI) / 360);
     const index = pickPoint(cloud.positions, eye.toArray(), along.toArray(), slope);
     if (index < 0) return;
