@@ -22,8 +22,8 @@ export interface Loaded {
 
 /** More threads than this gain little: the work waits for memory. */
 const mostThreads = 16;
-/** Memory that the modules begin with, in pages of 64 KiB; equal to --initial-memory in scripts/*.toml. */
-const initialPages = 32;
+/** What the modules begin with, in pages of 64 KiB: --initial-memory in scripts/*.toml, and some that wasm-bindgen adds. */
+const initialPages = 40;
 /** An engine that refuses this much shared memory gets no threads. */
 const leastMiB = 512;
 
