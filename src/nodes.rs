@@ -68,3 +68,80 @@ pub(crate) fn nodes(grid: &Grid, moments: &[Moments], stage: &Stage) -> Result<V
     })?;
     Ok(nodes)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lattice::Lattice;
+    use crate::points::Points;
+    use crate::progress::Progress;
+    use glam::{DMat3, DVec3, IVec3};
+
+    /// Some points on a bumpy surface, some in a volume, in a turned and stretched box.
+    fn cloud(count: u32) -> Vec<Vec3> {
+        let random = |i: u32| (f64::from(i.wrapping_mul(2_654_435_769) ^ (i << 7)) * 0.618_033_988_749).fract() as f32;
+        (0..count)
+            .map(|i| {
+                let (x, y, z) = (random(3 * i), random(3 * i + 1), random(3 * i + 2));
+                Vec3::new(x, 3.0 * y, if i % 4 == 0 { z } else { 0.3 + 0.1 * (9.0 * x).sin() * (5.0 * y).cos() })
+            })
+            .collect()
+    }
+
+    /// Every node against the covariance of the paper's Q, gathered by brute force in double precision.
+    #[test]
+    fn nodes_are_those_of_the_points_in_27_cubes() {
+        let positions = cloud(3000);
+        let points = Points::from_f32(bytemuck::cast_slice(&positions)).unwrap();
+        let (min, max) = (DVec3::ZERO, DVec3::new(1.0, 3.0, 1.0));
+        for edge in [0.03, 0.11, 0.25] {
+            let lattice = Lattice::new(min, max, min, edge);
+            let progress = Progress::silent();
+            let stage = progress.stage("test", 0.0..1.0);
+            let grid = Grid::sort(&points, &lattice, &stage).unwrap();
+            let moments = grid.moments(&stage).unwrap();
+            let nodes = nodes(&grid, &moments, &stage).unwrap();
+
+            let cube = |p: &Vec3| (p.as_dvec3() / edge).floor().as_ivec3();
+            let mut nodes = nodes.iter();
+            let mut planes = 0;
+            for brick in 0..grid.bricks.len() {
+                for (points, bit) in grid.cubes_of(brick) {
+                    let node = nodes.next().unwrap();
+                    let place = 4 * grid.bricks.places[brick]
+                        + IVec3::new(bit as i32 & 3, bit as i32 >> 2 & 3, bit as i32 >> 4);
+                    let own: Vec<u32> = (0..3000).filter(|i| cube(&positions[*i as usize]) == place).collect();
+                    assert_eq!(points.iter().map(|p| p.point).collect::<Vec<_>>(), own, "sorted, in the input's order");
+
+                    let centre = (place.as_dvec3() + 0.5) * edge;
+                    let near: Vec<DVec3> = positions
+                        .iter()
+                        .filter(|p| (cube(p) - place).abs().max_element() <= 1)
+                        .map(|p| (p.as_dvec3() - centre) / edge)
+                        .collect();
+                    let mean = near.iter().sum::<DVec3>() / near.len() as f64;
+                    let covariance = near.iter().fold(DMat3::ZERO, |sum, p| {
+                        let d = *p - mean;
+                        sum + DMat3::from_cols(d * d.x, d * d.y, d * d.z)
+                    }) * (1.0 / near.len() as f64);
+                    if !node.has_plane() {
+                        assert!(near.len() < 4, "{} points without a plane", near.len());
+                        continue;
+                    }
+                    // The normal is an eigenvector, and the smallest of the Rayleigh quotients is its own.
+                    let normal = node.normal.as_dvec3();
+                    let value = normal.dot(covariance * normal);
+                    assert!((covariance * normal - normal * value).length() < 2e-6, "not an eigenvector");
+                    for other in [normal.any_orthogonal_vector(), normal.cross(normal.any_orthogonal_vector())] {
+                        let other = other.normalize();
+                        assert!(other.dot(covariance * other) > value - 2e-6, "not the smallest");
+                    }
+                    assert!((f64::from(node.offset) - normal.dot(mean)).abs() < 2e-6, "not through the centroid");
+                    planes += 1;
+                }
+            }
+            assert!(nodes.next().is_none());
+            assert!(planes > 100);
+        }
+    }
+}

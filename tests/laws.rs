@@ -1,0 +1,276 @@
+//! What holds for every input.
+#![cfg(not(target_arch = "wasm32"))]
+
+mod common;
+
+use bilinormal::{Cell, Error, Method, Options, Orient, Points, Progress, estimate};
+use common::*;
+use std::cell::RefCell;
+use std::ops::ControlFlow;
+
+const CELLS: [Cell; 5] = [Cell::Auto, Cell::Scale(0.1), Cell::Scale(1.5), Cell::Scale(100.0), Cell::Size(0.3)];
+
+/// Length kept, every normal a unit vector or zero, on the side of the documented rule, and the report adds up.
+fn check(name: &str, points: &[f32], cell: Cell) -> bilinormal::Estimate {
+    let result = run(points, cell);
+    let report = &result.report;
+    assert_eq!(result.normals.len(), points.len(), "{name} {cell:?}");
+    let mut zero = 0;
+    for n in result.normals.chunks_exact(3) {
+        let length = n.iter().map(|c| f64::from(*c).powi(2)).sum::<f64>().sqrt();
+        zero += u64::from(length == 0.0);
+        assert!(length == 0.0 || (length - 1.0).abs() < 1e-5, "{name} {cell:?}: {n:?}");
+        assert!(n[0] + 2.0 * n[1] + 4.0 * n[2] > -1e-5, "{name} {cell:?}: {n:?}");
+        assert!(n.iter().all(|c| c.to_bits() != (-0.0f32).to_bits()), "{name} {cell:?}: {n:?}");
+    }
+    assert_eq!(report.unresolved, zero, "{name} {cell:?}");
+    assert_eq!(report.points, points.len() as u64 / 3);
+    assert_eq!(report.nodes_used.iter().sum::<u64>(), report.points, "{name} {cell:?}");
+    assert!(report.nodes <= report.cells && report.cells <= report.points, "{name} {cell:?}");
+    assert!(report.cell_size > 0.0 && report.cell_size.is_finite(), "{name} {cell:?}: {}", report.cell_size);
+    assert!(report.scale > 0.0 && report.scale.is_finite(), "{name} {cell:?}: {}", report.scale);
+    assert!(report.grid.iter().all(|n| *n >= 1), "{name} {cell:?}");
+    result
+}
+
+fn odd_clouds() -> Vec<(&'static str, Vec<f32>)> {
+    let nan = f32::NAN;
+    let mut random = Random(1);
+    let mut spoilt = sphere(5000, 2).points;
+    for i in (0..spoilt.len()).step_by(7) {
+        spoilt[i] = [nan, f32::INFINITY, f32::NEG_INFINITY][i % 3];
+    }
+    vec![
+        ("empty", vec![]),
+        ("one point", vec![1.0, 2.0, 3.0]),
+        ("two points", vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0]),
+        ("three points", vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]),
+        ("all equal", [1.5, -2.5, 3.5].repeat(1000)),
+        ("on an axis", (0..1000).flat_map(|i| [i as f32, 0.0, 0.0]).collect()),
+        ("on a diagonal", (0..1000).flat_map(|i| [i as f32 * 0.3; 3]).collect()),
+        ("none finite", [nan, 1.0, f32::INFINITY].repeat(100)),
+        ("one finite", [vec![nan; 30], vec![1.0, 2.0, 3.0]].concat()),
+        ("some not finite", spoilt),
+        ("a volume", (0..30_000).map(|_| random.signed() as f32).collect()),
+        ("huge", sphere(3000, 3).points.iter().map(|c| c * 3e38).collect()),
+        ("tiny", sphere(3000, 4).points.iter().map(|c| c * 1e-30).collect()),
+        ("subnormal", sphere(3000, 5).points.iter().map(|c| c * 1e-42).collect()),
+        ("far from the origin", sphere(3000, 6).points.iter().map(|c| c + 1e6).collect()),
+        (
+            "a needle",
+            (0..9000).map(|i| if i % 3 == 0 { random.signed() as f32 * 1e7 } else { random.signed() as f32 }).collect(),
+        ),
+        ("half of it one point", [[0.1, 0.2, 0.3].repeat(2000), sphere(2000, 7).points].concat()),
+        ("two points a world apart", [-3e38, 0.0, 0.0, 3e38, 0.0, 0.0].to_vec()),
+        ("coarse numbers", sphere(9000, 8).points.iter().map(|c| (c * 8.0).round()).collect()),
+    ]
+}
+
+#[test]
+fn every_cloud_ends_in_unit_or_zero_vectors() {
+    for (name, points) in odd_clouds() {
+        for cell in CELLS {
+            check(name, &points, cell);
+        }
+    }
+}
+
+#[test]
+fn points_without_a_plane_are_unresolved() {
+    for (name, points) in odd_clouds() {
+        let result = check(name, &points, Cell::Auto);
+        let expected = match name {
+            "one point"
+            | "two points"
+            | "all equal"
+            | "on an axis"
+            | "on a diagonal"
+            | "none finite"
+            | "one finite"
+            | "two points a world apart" => result.report.points,
+            "huge" | "tiny" | "some not finite" | "far from the origin" => {
+                points.chunks(3).filter(|p| p.iter().any(|c| !c.is_finite())).count() as u64
+            }
+            _ => continue,
+        };
+        assert_eq!(result.report.unresolved, expected, "{name}");
+    }
+}
+
+/// The plane of three points, found although its node may lie outside the cube.
+#[test]
+fn three_points_have_a_normal() {
+    let result = run(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0], Cell::Scale(3.0));
+    for normal in result.normals.chunks(3) {
+        assert_eq!(normal, [0.0, 0.0, 1.0]);
+    }
+}
+
+#[test]
+fn points_that_are_not_finite_influence_no_other() {
+    let clean = sphere(20_000, 9).points;
+    let mut spoilt = Vec::new();
+    let mut kept = Vec::new();
+    for (i, point) in clean.chunks(3).enumerate() {
+        if i % 5 == 0 {
+            let mut bad = [9e9, -9e9, 0.5];
+            bad[i % 3] = if i % 2 == 0 { f32::NAN } else { f32::INFINITY };
+            spoilt.extend(bad);
+            kept.push(false);
+        }
+        spoilt.extend(point);
+        kept.push(true);
+    }
+    for cell in [Cell::Scale(1.0), Cell::Size(0.05)] {
+        let (clean, spoilt) = (run(&clean, cell), run(&spoilt, cell));
+        let left: Vec<f32> =
+            spoilt.normals.chunks(3).zip(&kept).filter(|(_, k)| **k).flat_map(|(n, _)| n.to_vec()).collect();
+        assert_eq!(left, clean.normals);
+        assert_eq!(spoilt.report.unresolved, kept.iter().filter(|k| !**k).count() as u64);
+    }
+}
+
+#[test]
+fn the_same_bits_for_any_number_of_threads() {
+    let mut points = torus(300_000, 10).points;
+    points.extend(odd_clouds().into_iter().find(|(name, _)| *name == "some not finite").unwrap().1);
+    let strayed = [points.clone(), vec![1e9, 1e9, 1e9]].concat();
+    for points in [points, strayed] {
+        for cell in [Cell::Auto, Cell::Scale(1.0), Cell::Size(0.05)] {
+            let mut results = [1, 2, 3, 8].map(|threads| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| run(&points, cell))
+            });
+            results.iter_mut().for_each(|r| r.report.milliseconds.clear());
+            for other in &results[1..] {
+                assert!(results[0] == *other, "{cell:?}");
+            }
+        }
+    }
+}
+
+/// Powers of two and whole numbers that single precision holds exactly: the same bits.
+#[test]
+fn scale_and_shift_change_nothing() {
+    let points: Vec<f32> = terrain(30_000, 11).points.iter().map(|c| (c * 4096.0).round() / 4096.0).collect();
+    let scaled: Vec<f32> = points.iter().map(|c| c * 1024.0).collect();
+    let shifted: Vec<f32> = points.iter().map(|c| c + 16.0).collect();
+    for cell in [Cell::Auto, Cell::Scale(1.0)] {
+        let result = run(&points, cell);
+        assert_eq!(run(&scaled, cell).normals, result.normals, "{cell:?}");
+        assert_eq!(run(&shifted, cell).normals, result.normals, "{cell:?}");
+    }
+}
+
+#[test]
+fn permutation_moves_the_normals_with_the_points() {
+    let cloud = torus(50_000, 12);
+    let mut random = Random(13);
+    let mut order: Vec<usize> = (0..50_000).collect();
+    for i in (1..order.len()).rev() {
+        order.swap(i, (random.bits() % (i as u64 + 1)) as usize);
+    }
+    let permuted: Vec<f32> = order.iter().flat_map(|&i| cloud.points[3 * i..3 * i + 3].to_vec()).collect();
+    let (a, b) = (run(&cloud.points, Cell::Scale(1.0)), run(&permuted, Cell::Scale(1.0)));
+    let expected: Vec<[f64; 3]> = order.iter().map(|&i| [0, 1, 2].map(|c| f64::from(a.normals[3 * i + c]))).collect();
+    // Sums in another order differ by rounding alone.
+    assert!(worst(&angles(&b.normals, &expected)) < 0.01);
+    assert_eq!(a.report.nodes_used, b.report.nodes_used);
+}
+
+/// Turning a cloud changes the grid it meets: a slanted surface crosses its 27 cubes in a wider patch, so it is smoothed
+/// more, within bounds.
+#[test]
+fn rotation_keeps_the_accuracy_within_bounds() {
+    let cloud = terrain(100_000, 14);
+    let turned = Cloud::of(
+        cloud.points.chunks(3).zip(&cloud.normals).map(|(p, n)| (turn([0, 1, 2].map(|i| f64::from(p[i]))), turn(*n))),
+    );
+    let error = |cloud: &Cloud| root_mean_square(&angles(&run(&cloud.points, Cell::Auto).normals, &cloud.normals));
+    let (straight, turned) = (error(&cloud), error(&turned));
+    assert!((0.67..1.5).contains(&(turned / straight)), "{turned} against {straight} degrees");
+}
+
+#[test]
+fn a_stray_point_a_million_extents_away_changes_nothing_noticeable() {
+    let cloud = sphere(50_000, 15);
+    for stray in [[2e6, 2e6, 2e6], [-2e6, 0.0, 0.0], [-1e30, 1e30, 0.0]] {
+        let points = [cloud.points.clone(), stray.to_vec()].concat();
+        let (with, without) = (run(&points, Cell::Auto), run(&cloud.points, Cell::Auto));
+        assert!((with.report.cell_size / without.report.cell_size - 1.0).abs() < 0.05);
+        let error = |normals: &[f32]| root_mean_square(&angles(normals, &cloud.normals));
+        let (a, b) = (error(&with.normals[..150_000]), error(&without.normals));
+        assert!((a / b - 1.0).abs() < 0.1, "{stray:?}: {a} against {b} degrees");
+        assert_eq!(with.report.unresolved, 1);
+    }
+}
+
+#[test]
+fn progress_rises_from_0_to_1_and_can_stop_the_call_anywhere() {
+    let cloud = sphere(600_000, 16);
+    let points = Points::from_f32(&cloud.points).unwrap();
+    let heard = RefCell::new(Vec::new());
+    let observer = |phase: &'static str, fraction: f64| {
+        heard.borrow_mut().push((phase, fraction));
+        ControlFlow::Continue(())
+    };
+    estimate(&points, &Options::default(), &Progress::new(&observer, &|| 0.0)).unwrap();
+    let heard = heard.into_inner();
+    assert_eq!(heard.first().unwrap().1, 0.0);
+    assert_eq!(heard.last().unwrap().1, 1.0);
+    assert!(heard.is_sorted_by(|a, b| a.1 <= b.1), "{heard:?}");
+    assert!(heard.len() > 8, "{heard:?}");
+    for stop in 0..heard.len() {
+        let calls = RefCell::new(0);
+        let observer = |_: &'static str, _: f64| {
+            *calls.borrow_mut() += 1;
+            if *calls.borrow() > stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let result = estimate(&points, &Options::default(), &Progress::new(&observer, &|| 0.0));
+        assert_eq!(result, Err(Error::Cancelled));
+        assert_eq!(*calls.borrow(), stop + 1, "nothing is told after the stop");
+    }
+}
+
+#[test]
+fn options_out_of_range_are_refused_with_what_was_wanted() {
+    let text = |options: Options| {
+        let points = [0.0; 9];
+        let error = estimate(&Points::from_f32(&points).unwrap(), &options, &Progress::silent()).unwrap_err();
+        (matches!(error, Error::Unsupported(_)), error.to_string())
+    };
+    for cell in [Cell::Scale(0.0), Cell::Scale(0.09), Cell::Scale(101.0), Cell::Scale(f64::NAN), Cell::Size(0.0)]
+        .into_iter()
+        .chain([Cell::Size(-1.0), Cell::Size(f64::INFINITY), Cell::Size(f64::NAN)])
+    {
+        let (unsupported, text) = text(Options { cell, ..Options::default() });
+        assert!(!unsupported && text.contains("wanted"), "{text}");
+    }
+    for options in [
+        Options { method: Method::Knn, ..Options::default() },
+        Options { method: Method::Egg, ..Options::default() },
+        Options { orient: Orient::Consistent, ..Options::default() },
+        Options { orient: Orient::Outward, ..Options::default() },
+        Options { orient: Orient::Viewpoint([0.0; 3]), ..Options::default() },
+        Options { orient: Orient::Up([0.0, 0.0, 1.0]), ..Options::default() },
+        Options { curvature: true, ..Options::default() },
+    ] {
+        let (unsupported, text) = text(options);
+        assert!(unsupported && text.contains("not in this version"), "{text}");
+    }
+    assert!(matches!(Points::from_f32(&[1.0; 4]), Err(Error::Input(text)) if text.contains("multiple of 3")));
+    assert!(matches!(Points::from_f64(&[1.0; 5]), Err(Error::Input(text)) if text.contains("multiple of 3")));
+}
+
+/// Doubles beyond the range of single precision on either side.
+#[test]
+fn doubles_of_any_magnitude() {
+    let cloud = sphere(5000, 17);
+    for scale in [1e-300, 1e-40, 1.0, 1e40, 1e300] {
+        let points: Vec<f64> = cloud.points.iter().map(|c| f64::from(*c) * scale).collect();
+        let result = estimate(&Points::from_f64(&points).unwrap(), &Options::default(), &Progress::silent()).unwrap();
+        let error = root_mean_square(&angles(&result.normals, &cloud.normals));
+        assert!(error < 2.0, "{scale}: {error} degrees");
+        assert!((0.01..1.0).contains(&(result.report.cell_size / scale)), "{scale}: {}", result.report.cell_size);
+    }
+}
