@@ -44,6 +44,7 @@ export interface Margins {
   top: number;
   right: number;
   bottom: number;
+  left: number;
 }
 
 /** While the camera moves, clouds above this size may be drawn in part, if whole frames take too long. */
@@ -86,7 +87,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   let sparse: BufferGeometry | undefined;
   let shading: Shading = 'shaded';
   let pointSize = 1;
-  let margins: Margins = { top: 0, right: 0, bottom: 0 };
+  let margins: Margins = { top: 0, right: 0, bottom: 0, left: 0 };
 
   let frame = 0;
   let lastFrame = 0;
@@ -178,7 +179,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   function framingDistance(direction: Vector3, half: Vector3, radius: number): number {
     const { clientWidth: width, clientHeight: height } = canvas;
     const slope = Math.tan((camera.fov * Math.PI) / 360) / height;
-    const across = slope * Math.max(width - margins.right, width / 4);
+    const across = slope * Math.max(width - margins.left - margins.right, width / 4);
     const upright = slope * Math.max(height - margins.top - margins.bottom, height / 4);
     const right = new Vector3(0, 1, 0).cross(direction).normalize();
     const above = new Vector3().crossVectors(direction, right);
@@ -197,7 +198,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     renderer.setSize(width, height, false);
     camera.aspect = width / height;
     // The middle of what is not covered is the middle of the view.
-    camera.setViewOffset(width, height, margins.right / 2, (margins.bottom - margins.top) / 2, width, height);
+    const { top, right, bottom, left } = margins;
+    camera.setViewOffset(width, height, (right - left) / 2, (bottom - top) / 2, width, height);
     request();
   }
 
