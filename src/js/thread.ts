@@ -2,4 +2,4 @@
 import type { ThreadBoot } from './protocol.js';
 import { runThread } from './run-thread.js';
 
-onmessage = (event: MessageEvent<ThreadBoot>) => runThread(event.data, postMessage);
+onmessage = (event: MessageEvent<ThreadBoot>) => runThread(event.data, (reason) => postMessage(reason));
