@@ -72,7 +72,7 @@ function buildWasm(name) {
   const glue = join(folder, 'bilinormal.js');
   writeFileSync(glue, finish(readFileSync(glue, 'utf8')));
   rmSync(join(folder, 'snippets'), { recursive: true, force: true });
-  minify([glue]);
+  esbuild([`dist/${name}/bilinormal.js`, `--outfile=dist/${name}/bilinormal.js`, '--allow-overwrite']);
 }
 
 /**
@@ -85,18 +85,21 @@ function withOwnPool(glue) {
   return glue.replace(helper, "$1'../pool.js'");
 }
 
+/** The scripts that are imported or started by their own address; every other module goes into those that use it. */
+const SCRIPTS = ['index', 'node', 'link', 'pool', 'worker', 'worker-node', 'thread', 'thread-node', 'three', 'cli'];
+
 function buildJavaScript() {
-  const compiled = () => filesIn('dist', '.js').filter((path) => dirname(path) === 'dist');
   // What an older source left behind must not enter the package.
-  for (const path of compiled()) rmSync(join(root, path));
+  for (const path of filesIn('dist').filter((path) => dirname(path) === 'dist')) rmSync(join(root, path));
   run('tsc', ['--project', '.']);
-  minify(compiled().map((path) => join(root, path)));
+  // `new URL('./worker.js', import.meta.url)` and the imports of glue stay as they are, for browsers and bundlers.
+  const apart = ['./link.js', './pool.js', './node.js', './single/*', './threads/*'].map((path) => `--external:${path}`);
+  const scripts = SCRIPTS.map((name) => `src/js/${name}.ts`);
+  esbuild([...scripts, '--bundle', '--packages=external', ...apart, '--outdir=dist']);
 }
 
-/** File by file, without bundling: a bundler or browser must still see `new URL('./worker.js', import.meta.url)`. */
-function minify(files) {
-  const output = [`--outdir=${root}`, `--outbase=${root}`, '--allow-overwrite', '--log-level=warning'];
-  run('esbuild', [...files, '--minify', '--format=esm', '--target=es2022', ...output]);
+function esbuild(options) {
+  run('esbuild', [...options, '--minify', '--format=esm', '--target=es2022', '--log-level=warning']);
 }
 
 function checkSizes() {

@@ -15,6 +15,8 @@ export interface ErrorDetails {
 
 /** Every error of this package, except that an abort rejects with `signal.reason`. */
 export class BilinormalError extends Error implements ErrorDetails {
+  // Minified code gives classes other names.
+  static override readonly name = 'BilinormalError';
   override readonly name = 'BilinormalError';
   readonly code: ErrorCode;
   declare readonly line?: number;
@@ -27,20 +29,4 @@ export class BilinormalError extends Error implements ErrorDetails {
     this.code = code;
     Object.assign(this, details);
   }
-}
-
-/** An error as it crosses from the worker. */
-export interface Failure extends ErrorDetails {
-  /** Without a code, the wasm module broke. */
-  code?: ErrorCode;
-  message: string;
-  /** The worker is of no more use. */
-  fatal?: boolean;
-}
-
-/** Packs what was thrown for the way out of the worker, without what is undefined. */
-export function failure(error: unknown): Failure {
-  const { code, message = String(error), line, byte, needed, available } = error as Partial<Failure>;
-  const known = ['format', 'input', 'limit', 'unsupported'].includes(code!);
-  return known ? JSON.parse(JSON.stringify({ code, message, line, byte, needed, available })) : { message };
 }

@@ -1,6 +1,5 @@
 // Which of the two builds runs, and its start.
-import { BilinormalError } from './error.js';
-import { detect } from './features.js';
+import { coded } from './failure.js';
 import { pool } from './pool.js';
 import type { Mode, Start, StartWorker } from './protocol.js';
 import type { Glue, ThreadsGlue } from './wasm.js';
@@ -28,20 +27,17 @@ const initialPages = 40;
 const leastMiB = 512;
 
 export async function load(start: Start, platform: Platform): Promise<Loaded> {
-  const features = detect();
-  if (!features.simd) throw new BilinormalError('unsupported', `${features.reason}; a newer browser has it`);
   const { threads = 'auto' } = start;
   const count = threads === 'auto' ? Math.min(platform.processors, mostThreads) : threads;
-  let { reason } = features;
-  if (count > 1 && !reason) {
+  let { reason } = start;
+  if (count < 2) reason = threads === 1 ? undefined : 'there is one processor';
+  else if (!reason) {
     try {
       return await loadThreads(count, start, platform);
     } catch (error) {
       reason = `threads did not start: ${(error as Error).message}`;
     }
   }
-  if (threads === 'auto' && count < 2) reason = 'there is one processor';
-  if (threads === 1) reason = undefined;
   return loadSingle(start, platform, { mode: 'single', threads: 1, ...(reason && { fallbackReason: reason }) });
 }
 
@@ -76,7 +72,7 @@ async function compile({ wasmUrl }: Start, file: string, bundled: () => URL, { l
   try {
     return await WebAssembly.compile(await load(url));
   } catch (error) {
-    throw new BilinormalError('unsupported', `${url.href} did not load: ${(error as Error).message}`);
+    throw coded('unsupported', `${url.href} did not load: ${(error as Error).message}`);
   }
 }
 

@@ -1,5 +1,5 @@
 // What the calling thread, the worker and the threads of its pool say to each other.
-import type { Failure } from './error.js';
+import type { Failure } from './failure.js';
 import type { EstimatorOptions, Report } from './types.js';
 
 /** A worker as its owner sees it, in browsers and in Node alike. */
@@ -20,6 +20,8 @@ export interface Start extends EstimatorOptions {
   kind: 'start';
   /** Name of the BroadcastChannel on which a thread tells its death: the worker that owns it cannot, it waits for it. */
   channel: string;
+  /** Why there can be no threads, found out by the calling thread. */
+  reason?: string;
 }
 
 export type Call =

@@ -1,5 +1,5 @@
 // The worker's side: takes one call after the other into wasm and hands results out.
-import { BilinormalError, failure } from './error.js';
+import { coded, failure } from './failure.js';
 import { load, type Loaded, type Platform } from './loader.js';
 import type { Bytes, Call, Reply, Start } from './protocol.js';
 import type { Buffer, Tell } from './wasm.js';
@@ -51,27 +51,23 @@ async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Plat
     return bytes;
   }
 
+  /** Half of the progress. */
   async function putFile(file: Bytes): Promise<Buffer> {
     if (file instanceof Uint8Array) return put(file);
-    const blob = typeof file === 'string' ? openFile(file) : file;
-    const buffer = new glue.Buffer(blob.size);
+    let buffer: Buffer | undefined;
     try {
+      const blob = typeof file === 'string' ? platform.open!(file) : file;
+      buffer = new glue.Buffer(blob.size);
       for (let at = 0; at < blob.size; at += pieceBytes) {
         tell('load', at / blob.size / 2);
         view(buffer).set(new Uint8Array(await blob.slice(at, at + pieceBytes).arrayBuffer()), at);
       }
+      return buffer;
     } catch (error) {
-      buffer.free();
-      throw unreadable(error);
-    }
-    return buffer;
-  }
-
-  function openFile(url: string) {
-    try {
-      return platform.open!(url);
-    } catch (error) {
-      throw unreadable(error);
+      // Without a buffer the file did not open, or memory does not suffice for it.
+      if (!buffer && failure(error).code) throw error;
+      buffer?.free();
+      throw coded('input', `the file could not be read: ${(error as Error).message}`);
     }
   }
 
@@ -85,9 +81,7 @@ async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Plat
     return new Blob(parts, { type: 'application/octet-stream' });
   }
 
-  // A file that was loaded has half of its progress behind it.
-  const tellRest: Tell = (phase, fraction) =>
-    tell(phase, 'file' in call && !(call.file instanceof Uint8Array) ? (1 + fraction) / 2 : fraction);
+  const tellRest: Tell = (phase, fraction) => tell(phase, (1 + fraction) / 2);
 
   switch (call.kind) {
     case 'hello':
@@ -101,24 +95,19 @@ async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Plat
     }
     case 'read': {
       const cloud = glue.readPly(await putFile(call.file), call.maxPoints, tellRest);
-      const transfer: ArrayBuffer[] = [];
-      const own = (buffer: Buffer) => {
-        const bytes = take(buffer);
-        transfer.push(bytes);
-        return bytes;
-      };
       const { count, origin, format, properties, comments } = cloud;
-      const positions = new Float32Array(own(cloud.takePositions()));
-      const [normals, colors, intensity] = [cloud.takeNormals(), cloud.takeColors(), cloud.takeIntensity()];
-      const result = {
-        count,
-        positions,
-        origin: [...origin],
-        ...(normals && { normals: new Float32Array(own(normals)) }),
-        ...(colors && { colors: new Uint8Array(own(colors)) }),
-        ...(intensity && { intensity: new Float32Array(own(intensity)) }),
-        source: { format, properties, comments },
+      const result = { count, origin: [...origin], source: { format, properties, comments } };
+      const transfer: Transferable[] = [];
+      const add = <T>(name: string, Kind: new (bytes: ArrayBuffer) => T, part?: Buffer) => {
+        if (!part) return;
+        const bytes = take(part);
+        transfer.push(bytes);
+        Object.assign(result, { [name]: new Kind(bytes) });
       };
+      add('positions', Float32Array, cloud.takePositions());
+      add('normals', Float32Array, cloud.takeNormals());
+      add('colors', Uint8Array, cloud.takeColors());
+      add('intensity', Float32Array, cloud.takeIntensity());
       cloud.free();
       return [result, transfer];
     }
@@ -128,16 +117,13 @@ async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Plat
       return [takeFile(glue.writePly(file, normals, curvature, call.ascii, tellRest)), []];
     }
     case 'writeCloud': {
-      const [positions, normals, colors, intensity, curvature] = [
-        put(call.positions),
-        ...[call.normals, call.colors, call.intensity, call.curvature].map(putOptional),
-      ] as const;
       const { origin, comments, ascii } = call;
+      const [normals, colors, intensity, curvature] = [call.normals, call.colors, call.intensity, call.curvature].map(
+        putOptional,
+      );
+      const positions = put(call.positions);
       const file = glue.writeCloud(positions, origin, normals, colors, intensity, curvature, comments, ascii, tell);
       return [takeFile(file), []];
     }
   }
 }
-
-const unreadable = (error: unknown) =>
-  new BilinormalError('input', `the file could not be read: ${(error as Error).message}`);

@@ -5,77 +5,67 @@ import type { Bytes } from './protocol.js';
 /** The kind of a value, right across windows and workers: `Float32Array`, `Blob`, `Null`. */
 export const kindOf = (value: unknown): string => Object.prototype.toString.call(value).slice(8, -1);
 
-/** What came, for an error: `Array(12)`, `Null`, `String(3)`. */
-export function describe(value: any): string {
-  const length = value?.length;
-  return kindOf(value) + (typeof length === 'number' ? `(${length})` : '');
+/** Throws an `input` error that says what came and what was wanted, unless all is well. */
+export function want(well: unknown, name: string, value: any, wanted: string): asserts well {
+  if (well) return;
+  const came = Object(value) === value ? `${kindOf(value)}(${value.length ?? ''})` : value;
+  throw new BilinormalError('input', `${name} is ${came}; wanted ${wanted}`);
 }
 
-/** The bytes of a view, in a buffer of their own. */
-export function copyOf(view: ArrayBufferView): Uint8Array<ArrayBuffer> {
+/** The bytes of a buffer or view in a buffer of their own: copied, or taken where `take` is set and all of it came. */
+export function own(from: ArrayBufferLike | ArrayBufferView, take?: boolean): Uint8Array<ArrayBuffer> {
+  const { buffer = from as ArrayBuffer, byteOffset = 0, byteLength } = from as ArrayBufferView;
   try {
-    return new Uint8Array(view.buffer, view.byteOffset, view.byteLength).slice();
+    return take && byteLength === buffer.byteLength && kindOf(buffer) === 'ArrayBuffer'
+      ? new Uint8Array(structuredClone(buffer as ArrayBuffer, { transfer: [buffer as ArrayBuffer] }))
+      : new Uint8Array(buffer, byteOffset, byteLength).slice();
   } catch (error) {
-    if (error instanceof RangeError) {
-      const needed = view.byteLength;
-      throw new BilinormalError('limit', `no memory for a copy of ${needed} bytes; use transfer: true`, { needed });
-    }
-    throw new BilinormalError('input', 'the buffer is detached: it was transferred before');
+    // A RangeError: no memory for the copy. Any other: the buffer is detached, or its owner keeps it.
+    const { message } = error as Error;
+    throw error instanceof RangeError
+      ? new BilinormalError('limit', `${message}; use transfer: true or fewer points`, { needed: byteLength })
+      : new BilinormalError('input', `the buffer cannot be taken: ${message}`);
   }
 }
 
-/** Turns a source into bytes; downloads it if need be. `files`: whether addresses of local files can be opened. */
+/** Turns a source into bytes, by a download if need be. `files`: whether addresses of local files can be opened. */
 export async function resolve(
-  source: unknown,
+  source: any,
   files: boolean,
-  tell: (fraction: number) => void,
+  tell: (phase: string, fraction: number) => void,
   signal?: AbortSignal,
-): Promise<{ bytes: Bytes; downloaded?: boolean }> {
-  switch (kindOf(source)) {
-    case 'Blob':
-    case 'File':
-      return { bytes: source as Blob };
-    case 'ArrayBuffer':
-    case 'SharedArrayBuffer':
-      return { bytes: copyOf(new DataView(source as ArrayBuffer)) };
-    case 'Uint8Array':
-      return { bytes: copyOf(source as Uint8Array) };
-    case 'URL': {
-      const url = source as URL;
-      if (files && url.protocol === 'file:') return { bytes: url.href };
-      tell(0);
-      const response = await fetch(url, { signal: signal ?? null }).catch((error) => {
-        throw new BilinormalError(
-          'input',
-          `${url.href} could not be fetched: ${error.cause?.message ?? error.message}`,
-        );
-      });
-      return { bytes: await download(response, tell, signal), downloaded: true };
+): Promise<Bytes> {
+  const kind = kindOf(source);
+  if (/^(Blob|File)$/.test(kind)) return source;
+  if (/^(Uint8Array|(Shared)?ArrayBuffer)$/.test(kind)) return own(source);
+  let response: Response = source;
+  if (kind === 'URL') {
+    if (files && source.protocol === 'file:') return source.href;
+    tell('download', 0);
+    try {
+      response = await fetch(source, { signal: signal! });
+    } catch (error: any) {
+      throw new BilinormalError('input', `${source} did not load: ${error.cause?.message ?? error.message}`);
     }
-    case 'Response':
-      return { bytes: await download(source as Response, tell, signal), downloaded: true };
-  }
-  throw new BilinormalError(
-    'input',
-    `the source is ${describe(source)}; wanted a File, Blob, ArrayBuffer, Uint8Array, URL or Response`,
-  );
-}
+  } else want(kind === 'Response', 'the source', source, 'a File, Blob, ArrayBuffer, Uint8Array, URL or Response');
 
-/** Into a Blob, which the browser keeps where it likes. */
-async function download(response: Response, tell: (fraction: number) => void, signal?: AbortSignal): Promise<Blob> {
   const { ok, status, url, body, bodyUsed, headers } = response;
-  if (!ok) throw new BilinormalError('input', `${url || 'the Response'} answered with HTTP status ${status}`);
-  if (bodyUsed) throw new BilinormalError('input', 'the Response was read before; pass a fresh one');
-  if (!body) return new Blob();
+  if (!ok || bodyUsed) {
+    throw new BilinormalError(
+      'input',
+      `${url || 'the Response'} ${ok ? 'was read before' : `has HTTP status ${status}`}`,
+    );
+  }
   const total = Number(headers.get('content-length'));
   let loaded = 0;
+  // Counted on its way into a Blob, which the browser keeps where it likes.
   const count = new TransformStream<Uint8Array, Uint8Array>({
     transform(piece, controller) {
       loaded += piece.byteLength;
-      // A compressed body is longer than its declared length.
-      if (total) tell(Math.min(1, loaded / total));
+      // Half of the progress. A compressed body is longer than its declared length.
+      if (total) tell('download', Math.min(1, loaded / total) / 2);
       controller.enqueue(piece);
     },
   });
-  return new Response(body.pipeThrough(count, { signal })).blob();
+  return new Response(body?.pipeThrough(count, { signal: signal! })).blob();
 }

@@ -1,0 +1,20 @@
+// Errors on their way out of the worker.
+import type { ErrorCode, ErrorDetails } from './error.js';
+
+export interface Failure extends ErrorDetails {
+  /** Without a code, the wasm module broke. */
+  code?: ErrorCode;
+  message: string;
+  /** The worker is of no more use. */
+  fatal?: boolean;
+}
+
+/** An error of the worker's own; the calling thread makes a BilinormalError of it. */
+export const coded = (code: ErrorCode, message: string) => Object.assign(new Error(message), { code });
+
+/** Packs what was thrown, without what is undefined. */
+export function failure(error: unknown): Failure {
+  const { code, message = String(error), line, byte, needed, available } = error as Partial<Failure>;
+  const known = ['format', 'input', 'limit', 'unsupported'].includes(code!);
+  return known ? JSON.parse(JSON.stringify({ code, message, line, byte, needed, available })) : { message };
+}
