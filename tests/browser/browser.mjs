@@ -147,7 +147,8 @@ export async function colorsShown(page, { x = 498, y = 400, side = 200 } = {}) {
     context.drawImage(image, 0, 0);
     const { data } = context.getImageData(0, 0, image.width, image.height);
     const found = new Set();
-    for (let i = 0; i < data.length; i += 4) found.add(((data[i] >> 3) << 10) | ((data[i + 1] >> 3) << 5) | (data[i + 2] >> 3));
+    for (let i = 0; i < data.length; i += 4)
+      found.add(((data[i] >> 3) << 10) | ((data[i + 1] >> 3) << 5) | (data[i + 2] >> 3));
     return [...found];
   }, shot.toString('base64'));
   return colors.length;

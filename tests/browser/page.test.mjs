@@ -172,7 +172,10 @@ test('another cell, after a number that cannot be one', async () => {
   assert.ok(await again.isDisabled());
   await field.fill('3');
   await again.click();
-  await page.waitForFunction((cubes) => !document.querySelector('#facts').textContent.includes(cubes), auto.cubes.toLocaleString('en'));
+  await page.waitForFunction(
+    (cubes) => !document.querySelector('#facts').textContent.includes(cubes),
+    auto.cubes.toLocaleString('en'),
+  );
   const coarse = await result(page, 'ball.ply');
   assert.ok(coarse.cubes < auto.cubes / 2, `${coarse.cubes} cubes after ${auto.cubes}`);
 
@@ -231,8 +234,12 @@ test('a narrow screen shows everything without scrolling sideways', async () => 
   page = await browser.openPage(browser.isolated, { viewport: { width: 360, height: 640 }, hasTouch: true });
   const inside = () =>
     page.evaluate(() => {
-      const boxes = [...document.querySelectorAll('button, input, label, p, summary, li')].filter((e) => e.checkVisibility());
-      const out = boxes.filter((element) => element.getBoundingClientRect().right > innerWidth || element.getBoundingClientRect().left < 0);
+      const boxes = [...document.querySelectorAll('button, input, label, p, summary, li')].filter((e) =>
+        e.checkVisibility(),
+      );
+      const out = boxes.filter(
+        (element) => element.getBoundingClientRect().right > innerWidth || element.getBoundingClientRect().left < 0,
+      );
       return { width: document.documentElement.scrollWidth, out: out.map((element) => element.outerHTML.slice(0, 80)) };
     });
   assert.deepEqual(await inside(), { width: 360, out: [] });
