@@ -7,6 +7,8 @@ use std::borrow::Cow;
 
 /// No honest header comes near; bounds the work on a file that only begins like one.
 const HEADER_BYTES_MAX: usize = 16 << 20;
+/// The same, for work that is done for each element.
+const ELEMENTS_MAX: usize = 4096;
 
 /// A parsed header, with its lines so that a writer can repeat them.
 pub(super) struct Header<'a> {
@@ -146,6 +148,9 @@ impl<'a> Header<'a> {
                     Ok(element) => {
                         if element.name == "vertex" && header.elements.iter().any(|other| other.name == "vertex") {
                             return wrong("a second element named vertex; wanted one".into());
+                        }
+                        if header.elements.len() == ELEMENTS_MAX {
+                            return wrong(format!("more than {ELEMENTS_MAX} elements; wanted that many at most"));
                         }
                         header.elements.push(element);
                         LineKind::Element(header.elements.len() - 1)

@@ -12,8 +12,8 @@ use crate::progress::Progress;
 
 /// Writes a PLY file again, with normals and curvature in place of those it had.
 ///
-/// - `nx ny nz` (also named `normal_x normal_y normal_z`) and `curvature` are replaced where they stand and become
-///   `float`; new ones follow the other vertex properties.
+/// - `nx ny nz` (also named `normal_x normal_y normal_z`, in any letter case) and `curvature` are replaced where they
+///   stand and become `float`; new ones follow the other vertex properties.
 /// - Every other property, every element, comment and `obj_info` is kept in its order. The output is little-endian, or
 ///   text with `ascii`. Values keep their type and are the same to the bit; text becomes the nearest value of its
 ///   type, and stays as it is from text to text. Floats turned to text read back as the same value.
@@ -126,7 +126,8 @@ impl Plan {
         let mut open: Vec<usize> = (0..ADDED.len()).filter(|addition| wanted(*addition)).collect();
         let action = |name: &str| {
             let replaced = |addition: &usize| {
-                name == ADDED[*addition] || NORMAL.iter().any(|names| names.get(*addition) == Some(&name))
+                let is = |other: &&str| other.eq_ignore_ascii_case(name);
+                is(&ADDED[*addition]) || NORMAL.iter().any(|names| names.get(*addition).is_some_and(is))
             };
             match (0..ADDED.len()).filter(|addition| wanted(*addition)).find(replaced) {
                 None => Action::Keep,

@@ -4,7 +4,7 @@ import { mkdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { chromium } from 'playwright-core';
 import { root } from '../../scripts/run.mjs';
-import { serve } from '../../scripts/serve.mjs';
+import { ISOLATION, serve } from '../../scripts/serve.mjs';
 import { findBrowser } from '../../scripts/setup.mjs';
 
 /** For people to look at; not in git. */
@@ -20,20 +20,24 @@ const QUIET = [
 ];
 
 /**
- * A browser and two servers. The one without isolation serves the page from a sub-folder, as any file server may.
- * `close` ends them, and fails if a page has logged an error or asked another host for anything.
+ * A browser, and the page served in three ways: `isolated`; `plain`, without any header and from a sub-folder, as any
+ * file server may; `guarded`, isolated and with the page's own policy as a header.
  */
 export async function openBrowser() {
   mkdirSync(ARTEFACTS, { recursive: true });
-  const isolated = await serve(join(root, 'www', 'dist'));
+  const dist = join(root, 'www', 'dist');
+  const [, policy] = readFileSync(join(dist, 'index.html'), 'utf8').match(/content="(default-src[^"]*)"/);
+  const isolated = await serve(dist);
   const plain = await serve(join(root, 'www'), { headers: {} });
+  const guarded = await serve(dist, { headers: { ...ISOLATION, 'Content-Security-Policy': policy } });
   const browser = await chromium.launch({ executablePath: findBrowser(), args: QUIET });
   const surprises = [];
   return {
     isolated: isolated.url,
     plain: `${plain.url}dist/`,
+    guarded: guarded.url,
     async openPage(address, options = {}) {
-      const page = await browser.newPage({ viewport: { width: 1280, height: 800 }, ...options });
+      const page = await browser.newPage({ viewport: { width: 1280, height: 800 }, colorScheme: 'dark', ...options });
       page.on('pageerror', (error) => surprises.push(`page error: ${error.message}`));
       page.on('console', (message) => {
         if (message.type() === 'error') surprises.push(`console: ${message.text()}`);
@@ -47,11 +51,11 @@ export async function openBrowser() {
       await page.goto(address);
       return page;
     },
-    /** Takes what was recorded since the last call. */
+    /** Errors on a page and requests to other hosts since the last call. */
     surprises: () => surprises.splice(0),
     async close() {
       await browser.close();
-      await Promise.all([isolated.close(), plain.close()]);
+      await Promise.all([isolated, plain, guarded].map((server) => server.close()));
     },
   };
 }

@@ -117,10 +117,6 @@ impl Ply {
         property.values.iter().map(|bits| f32::from_bits(*bits as u32)).collect()
     }
 
-    pub fn vertex_properties(&self) -> Vec<&str> {
-        self.element("vertex").properties.iter().map(|property| property.name.as_str()).collect()
-    }
-
     /// Panics unless `other` holds all that this file holds, in the same order, apart from the vertex properties
     /// named in `except`.
     pub fn assert_kept(&self, other: &Ply, except: &[&str]) {

@@ -57,11 +57,12 @@ function start(viewer: Viewer): void {
   if (new URLSearchParams(location.search).has('sample')) void session.openSample();
 }
 
-/** What the panel and the status line cover: the right edge, or on a small screen top and bottom. */
+/** What the panel and the status line cover: the right edge and a corner, or on a small screen top and bottom. */
 function marginsOf(small: MediaQueryList): Margins {
   const { offsetWidth: width, offsetTop: gap } = element('#panel');
-  if (!small.matches) return { top: 0, right: width + gap, bottom: 0 };
-  return { top: element('#panel > summary').offsetHeight + gap, right: 0, bottom: 150 };
+  const title = element('#panel > summary').offsetHeight;
+  if (small.matches) return { top: title + gap, right: 0, bottom: 150, left: 0 };
+  return { top: 0, right: width + gap, bottom: 0, left: innerWidth > 1000 ? 240 : 0 };
 }
 
 /** Files dropped anywhere on the window. */

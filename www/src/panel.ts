@@ -53,8 +53,7 @@ export function showState(store: Store): void {
   });
 }
 
-const radio = (name: string, value: string) =>
-  element<HTMLInputElement>(`input[name="${name}"][value="${value}"]`);
+const radio = (name: string, value: string) => element<HTMLInputElement>(`input[name="${name}"][value="${value}"]`);
 
 function check(name: string, value: string): void {
   radio(name, value).checked = true;
@@ -97,9 +96,7 @@ function showResult(scan: Scan | undefined, report: Report | undefined): void {
   element('#status').hidden = scan === undefined;
   if (!scan) return;
   element('#total').textContent = report ? duration(report.milliseconds.total) : count(scan.points);
-  element('#total-label').textContent = report
-    ? `for ${plural(report.points, 'point')}`
-    : 'points, without normals';
+  element('#total-label').textContent = report ? `for ${plural(report.points, 'point')}` : 'points, without normals';
 
   const facts = element('#facts');
   facts.replaceChildren();

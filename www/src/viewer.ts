@@ -1,12 +1,22 @@
 // The view: plain arrays in, pixels on one canvas. It knows nothing of files, wasm or the rest of the page, and it draws
 // only when something has changed.
-import { BufferAttribute, BufferGeometry, Group, PerspectiveCamera, Points, Scene, Sphere, Vector3, WebGLRenderer } from 'three';
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Group,
+  PerspectiveCamera,
+  Points,
+  Scene,
+  Sphere,
+  Vector3,
+  WebGLRenderer,
+} from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
-import { createPointMaterial } from 'bilinormal/three';
-import { boundsOf, type Bounds } from './bounds';
+import { createPointMaterial, type Shading } from 'bilinormal/three';
+import type { Bounds } from './bounds';
 import { pickPoint } from './pick';
 
-export type Shading = 'shaded' | 'normals' | 'colors' | 'plain';
+export type { Shading };
 export type Up = 'y' | 'z';
 
 export interface Cloud {
@@ -34,6 +44,7 @@ export interface Margins {
   top: number;
   right: number;
   bottom: number;
+  left: number;
 }
 
 /** While the camera moves, clouds above this size may be drawn in part, if whole frames take too long. */
@@ -62,7 +73,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   // The world is y-up, with the middle of the cloud at its origin; this turns a z-up cloud into it.
   const turned = new Group();
   scene.add(turned);
-  const material = createPointMaterial();
+  // Warm and with little light on edges, so that form stands out against both backgrounds.
+  const material = createPointMaterial({ color: '#ebe2d3', ambient: 0.02, pixels: 1.5 });
   const points = new Points(new BufferGeometry(), material);
   // Bounds come from finite points only; three's own would turn into NaN.
   points.frustumCulled = false;
@@ -75,7 +87,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   let sparse: BufferGeometry | undefined;
   let shading: Shading = 'shaded';
   let pointSize = 1;
-  let margins: Margins = { top: 0, right: 0, bottom: 0 };
+  let margins: Margins = { top: 0, right: 0, bottom: 0, left: 0 };
 
   let frame = 0;
   let lastFrame = 0;
@@ -133,9 +145,9 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   /** Size of a point in world units, and larger where a part of the cloud has to stand for the whole. */
   function setSize(drawn: number): void {
     if (!cloud || !bounds) return;
-    // The surface of a scan has about as much area as the sphere round it; points without order need 1.6 times the
+    // The surface of a scan has about as much area as the sphere round it; points without order need 1.8 times the
     // spacing of an even pattern to close it.
-    const spacing = 1.6 * bounds.radius * Math.sqrt((4 * Math.PI) / Math.max(1, cloud.positions.length / 3));
+    const spacing = 1.8 * bounds.radius * Math.sqrt((4 * Math.PI) / Math.max(1, cloud.positions.length / 3));
     material.size = pointSize * spacing * Math.min(2, Math.sqrt(1 / drawn));
   }
 
@@ -167,7 +179,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   function framingDistance(direction: Vector3, half: Vector3, radius: number): number {
     const { clientWidth: width, clientHeight: height } = canvas;
     const slope = Math.tan((camera.fov * Math.PI) / 360) / height;
-    const across = slope * Math.max(width - margins.right, width / 4);
+    const across = slope * Math.max(width - margins.left - margins.right, width / 4);
     const upright = slope * Math.max(height - margins.top - margins.bottom, height / 4);
     const right = new Vector3(0, 1, 0).cross(direction).normalize();
     const above = new Vector3().crossVectors(direction, right);
@@ -186,7 +198,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     renderer.setSize(width, height, false);
     camera.aspect = width / height;
     // The middle of what is not covered is the middle of the view.
-    camera.setViewOffset(width, height, margins.right / 2, (margins.bottom - margins.top) / 2, width, height);
+    const { top, right, bottom, left } = margins;
+    camera.setViewOffset(width, height, (right - left) / 2, (bottom - top) / 2, width, height);
     request();
   }
 
@@ -197,7 +210,10 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     const y = 1 - ((event.clientY - box.top) / box.height) * 2;
     points.updateWorldMatrix(true, false);
     const eye = points.worldToLocal(camera.position.clone());
-    const along = points.worldToLocal(new Vector3(x, y, 0.5).unproject(camera)).sub(eye).normalize();
+    const along = points
+      .worldToLocal(new Vector3(x, y, 0.5).unproject(camera))
+      .sub(eye)
+      .normalize();
     const slope = (6 / box.height) * 2 * Math.tan((camera.fov * Math.PI) / 360);
     const index = pickPoint(cloud.positions, eye.toArray(), along.toArray(), slope);
     if (index < 0) return;
