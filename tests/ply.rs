@@ -733,6 +733,14 @@ fn a_comment_cannot_become_a_header_line() {
 }
 
 #[test]
+fn a_line_feed_within_a_row_stays_a_blank() {
+    let source = "ply\rformat ascii 1.0\relement a 1\rproperty int b\rproperty int c\relement vertex 1\rproperty float x\r\
+                  property float y\rproperty float z\rend_header\r7\n8\r1\n2 3\r";
+    let written = String::from_utf8(write(source, &[0.0; 3], true).unwrap()).unwrap();
+    assert!(written.ends_with("end_header\n7 8\n1 2 3 0 0 0\n"), "{written}");
+}
+
+#[test]
 fn many_rows_are_written_in_tasks() {
     let count = 150_000_usize;
     let number = |i: usize| i as f32 * 0.5;

@@ -31,6 +31,16 @@ impl Sink {
         Ok(())
     }
 
+    /// A line of the source and its end. In a file whose lines end with `\r` alone, a line may hold a `\n`, which would
+    /// end it here: it becomes a blank.
+    pub fn line(&mut self, text: &[u8]) -> Result<(), Error> {
+        for (part, text) in text.split(|byte| matches!(byte, b'\n' | b'\r')).enumerate() {
+            self.append(if part > 0 { b" " } else { b"" })?;
+            self.append(text)?;
+        }
+        self.append(b"\n")
+    }
+
     /// A value by its bits. Floats become the shortest text that reads back as the same value.
     pub fn value(&mut self, scalar: Scalar, bits: u64) -> Result<(), Error> {
         if !self.text {

@@ -198,14 +198,7 @@ fn header_text(header: &Header, vertex: usize, plan: &Plan, ascii: bool) -> Resu
                 let format = if ascii { Format::Ascii } else { Format::BinaryLittleEndian };
                 sink.append(format!("format {} 1.0\n", format.name()).as_bytes())?;
             }
-            Action::Keep => {
-                // With lines that end in `\r` alone, a line may hold a `\n`, which would end it here.
-                for (part, text) in line.text.split(|byte| matches!(byte, b'\n' | b'\r')).enumerate() {
-                    sink.append(if part > 0 { b" " } else { b"" })?;
-                    sink.append(text)?;
-                }
-                sink.append(b"\n")?;
-            }
+            Action::Keep => sink.line(line.text)?,
             Action::Drop => {}
             Action::Replace(addition) => sink.append(property(addition).as_bytes())?,
         }
@@ -348,8 +341,7 @@ impl Source<'_> {
                 for row in part.first as usize..part.first as usize + part.count {
                     cursor.next_row();
                     if *whole {
-                        sink.append(cursor.whole_row())?;
-                        sink.append(b"\n")?;
+                        sink.line(cursor.whole_row())?;
                         continue;
                     }
                     for (property, action) in element.properties.iter().zip(&plan.actions) {
