@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::lattice::Lattice;
-use crate::parallel::{self, Scatter};
+use crate::parallel::{self, Filling, Scatter};
 use crate::points::{CHUNK, Points, reserve};
 use crate::progress::Stage;
 use glam::IVec3;
@@ -32,42 +32,41 @@ pub(crate) const OUTSIDE: u32 = u32::MAX;
 impl Bricks {
     /// Finds the bricks of all points, and for each point the number of its brick. Two passes, parallel.
     pub fn find(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
-        let mut keys: Vec<u32> = Vec::new();
-        reserve(&mut keys, points.len(), "the sorting keys")?;
-        keys.resize(points.len(), OUTSIDE);
         let size = lattice.bricks();
         let volume = size.x as u128 * size.y as u128 * size.z as u128;
         // At most 3 bytes a point. A surface with a few points in a cube needs a tenth of that.
         let limit = (16 * points.len() as u128).clamp(1 << 20, 1 << 31);
-        let bricks = if volume <= limit {
-            Self::in_box(points, lattice, size, &mut keys, stage)?
+        if volume <= limit {
+            Self::in_box(points, lattice, size, stage)
         } else {
-            Self::in_table(points, lattice, &mut keys, stage)?
-        };
-        Ok((bricks, keys))
+            Self::in_table(points, lattice, stage)
+        }
     }
 
-    fn in_box(points: &Points, lattice: &Lattice, size: IVec3, keys: &mut [u32], stage: &Stage) -> Result<Self, Error> {
+    fn in_box(points: &Points, lattice: &Lattice, size: IVec3, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
         let count = (size.x as usize * size.y as usize * size.z as usize).div_ceil(64);
         let mut bits: Vec<AtomicU64> = Vec::new();
         reserve(&mut bits, count, "the grid")?;
         bits.resize_with(count, AtomicU64::default);
-        let target = Scatter::new(keys);
+        let slots = Filling::<u32>::new(points.len(), "the sorting keys")?;
         stage.part(0.0..0.6).run(points.chunks(), &|i| {
-            // SAFETY: each chunk of points is one task, and its keys are that task's.
-            let keys = unsafe { target.slice(parallel::piece(points.len(), CHUNK, i)) };
-            for (&point, key) in points.chunk(i).iter().zip(keys) {
-                if let Some((brick, _)) = lattice.locate(point) {
+            for point in parallel::piece(points.len(), CHUNK, i) {
+                let mut key = OUTSIDE;
+                if let Some((brick, _)) = lattice.locate(points.positions[point]) {
                     let slot = slot(size, brick);
-                    *key = slot as u32;
+                    key = slot as u32;
                     let (word, bit) = (&bits[slot / 64], 1 << (slot % 64));
                     // Reading first: most points find their bit set, and then no thread waits for another.
                     if word.load(Relaxed) & bit == 0 {
                         word.fetch_or(bit, Relaxed);
                     }
                 }
+                // SAFETY: each point belongs to one chunk.
+                unsafe { slots.write(point, key) };
             }
         })?;
+        // SAFETY: the chunks hold all points.
+        let mut keys = unsafe { slots.complete() };
 
         let bits: Vec<u64> = bits.into_iter().map(AtomicU64::into_inner).collect();
         let mut before = Vec::new();
@@ -83,18 +82,19 @@ impl Bricks {
             places.extend(set_bits(word).map(|bit| place(size, 64 * i + bit as usize)));
         }
 
+        let target = Scatter::new(&mut keys);
         stage.part(0.6..1.0).run(points.chunks(), &|i| {
-            // SAFETY: as above.
+            // SAFETY: each key belongs to one chunk.
             for key in unsafe { target.slice(parallel::piece(points.len(), CHUNK, i)) } {
                 if *key != OUTSIDE {
                     *key = rank(&bits, &before, *key as usize);
                 }
             }
         })?;
-        Ok(Self { places, index: Index::Box { size, bits, before } })
+        Ok((Self { places, index: Index::Box { size, bits, before } }, keys))
     }
 
-    fn in_table(points: &Points, lattice: &Lattice, keys: &mut [u32], stage: &Stage) -> Result<Self, Error> {
+    fn in_table(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
         // Sorted below, so the order in which the chunks come does not matter.
         let found = Mutex::new(Vec::new());
         stage.part(0.0..0.5).run(points.chunks(), &|i| {
@@ -126,16 +126,17 @@ impl Bricks {
         }
 
         let bricks = Self { places, index: Index::Table { slots } };
-        let target = Scatter::new(keys);
+        let keys = Filling::new(points.len(), "the sorting keys")?;
         stage.part(0.5..1.0).run(points.chunks(), &|i| {
-            // SAFETY: each chunk of points is one task, and its keys are that task's.
-            let keys = unsafe { target.slice(parallel::piece(points.len(), CHUNK, i)) };
-            for (&point, key) in points.chunk(i).iter().zip(keys) {
-                let number = lattice.locate(point).and_then(|(brick, _)| bricks.number(brick));
-                *key = number.unwrap_or(OUTSIDE);
+            for point in parallel::piece(points.len(), CHUNK, i) {
+                let number = lattice.locate(points.positions[point]).and_then(|(brick, _)| bricks.number(brick));
+                // SAFETY: each point belongs to one chunk.
+                unsafe { keys.write(point, number.unwrap_or(OUTSIDE)) };
             }
         })?;
-        Ok(bricks)
+        // SAFETY: the chunks hold all points.
+        let keys = unsafe { keys.complete() };
+        Ok((bricks, keys))
     }
 
     /// How many bricks there are.

@@ -3,16 +3,16 @@
 use crate::bricks::{Bricks, OUTSIDE, set_bits};
 use crate::error::Error;
 use crate::lattice::{Lattice, cube_centre, cube_in_brick};
-use crate::parallel::{self, Scatter};
+use crate::parallel::{self, Filling, Scatter};
 use crate::pca::Moments;
-use crate::points::{CHUNK, Points, reserve, zeroed};
+use crate::points::{CHUNK, Points, reserve};
 use crate::progress::Stage;
-use bytemuck::Zeroable;
 use glam::{IVec3, UVec3, Vec3};
+use std::mem::MaybeUninit;
 use std::ops::Range;
 
 /// A point in its brick.
-#[derive(Clone, Copy, Debug, Zeroable)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Placed {
     /// The place in the brick, in edges, 0 to 4.
     pub local: Vec3,
@@ -46,8 +46,7 @@ impl Grid {
     pub fn sort(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<(Self, Vec<Moments>), Error> {
         let (bricks, keys) = Bricks::find(points, lattice, &stage.part(0.0..0.35))?;
         let (first_point, by_brick) = sort_by_brick(points, lattice, &bricks, keys, &stage.part(0.35..0.75))?;
-        let mut placed = zeroed(by_brick.len(), "the sorted points")?;
-        let masks = sort_by_cube(&by_brick, &first_point, &mut placed, &stage.part(0.75..0.9))?;
+        let (placed, masks) = sort_by_cube(&by_brick, &first_point, &stage.part(0.75..0.9))?;
         drop(by_brick);
 
         let mut first_cube = Vec::new();
@@ -58,10 +57,9 @@ impl Grid {
             total += mask.count_ones();
             first_cube.push(total);
         }
-        let cube_end = zeroed(total as usize, "the cubes")?;
         let blocks = blocks(&first_point);
-        let mut grid = Self { bricks, masks, first_cube, first_point, cube_end, placed, blocks };
-        let moments = grid.sum(&stage.part(0.9..1.0))?;
+        let mut grid = Self { bricks, masks, first_cube, first_point, cube_end: Vec::new(), placed, blocks };
+        let moments = grid.sum(total as usize, &stage.part(0.9..1.0))?;
         Ok((grid, moments))
     }
 
@@ -71,9 +69,8 @@ impl Grid {
     }
 
     /// Sums up every cube, and notes where its points end.
-    fn sum(&mut self, stage: &Stage) -> Result<Vec<Moments>, Error> {
-        let mut moments = zeroed(self.cubes(), "the cubes")?;
-        let (sums, ends) = (Scatter::new(&mut moments), Scatter::new(&mut self.cube_end));
+    fn sum(&mut self, cubes: usize, stage: &Stage) -> Result<Vec<Moments>, Error> {
+        let (sums, ends) = (Filling::new(cubes, "the cubes")?, Filling::new(cubes, "the cubes")?);
         let (placed, first_point, first_cube) = (&self.placed, &self.first_point, &self.first_cube);
         let (masks, blocks) = (&self.masks, &self.blocks);
         stage.run(blocks.len(), &|block| {
@@ -93,7 +90,11 @@ impl Grid {
                 }
             }
         })?;
-        Ok(moments)
+        // SAFETY: the blocks hold all bricks, and these all cubes.
+        unsafe {
+            self.cube_end = ends.complete();
+            Ok(sums.complete())
+        }
     }
 
     /// The occupied cubes of a brick in their order: the points of each, and its bit in the mask.
@@ -123,7 +124,9 @@ fn sort_by_brick(
     let pieces = count.div_ceil(size);
     let of_piece = |i: usize| i * bricks.len()..(i + 1) * bricks.len();
 
-    let mut counts: Vec<u32> = zeroed(pieces * bricks.len(), "the grid")?;
+    let mut counts: Vec<u32> = Vec::new();
+    reserve(&mut counts, pieces * bricks.len(), "the grid")?;
+    counts.resize(pieces * bricks.len(), 0);
     let shared = Scatter::new(&mut counts);
     stage.part(0.0..0.15).run(pieces, &|i| {
         // SAFETY: each piece counts in its own part.
@@ -147,8 +150,7 @@ fn sort_by_brick(
     }
     first_point.push(total);
 
-    let mut placed: Vec<Placed> = zeroed(total as usize, "the sorted points")?;
-    let (shared, target) = (Scatter::new(&mut counts), Scatter::new(&mut placed));
+    let (shared, placed) = (Scatter::new(&mut counts), Filling::new(total as usize, "the sorted points")?);
     stage.part(0.15..1.0).run(pieces, &|i| {
         // SAFETY: each piece counts on in its own part.
         let next = unsafe { shared.slice(of_piece(i)) };
@@ -159,36 +161,33 @@ fn sort_by_brick(
             {
                 // SAFETY: `next` runs through the part of this piece and this brick, which the sums above gave to no
                 // other piece and no other brick.
-                unsafe { target.write(*next as usize, Placed { local, point: point as u32 }) };
+                unsafe { placed.write(*next as usize, Placed { local, point: point as u32 }) };
                 *next += 1;
             }
         }
     })?;
-    Ok((first_point, placed))
+    // SAFETY: as many places as points were counted, and each point was written to its own.
+    Ok((first_point, unsafe { placed.complete() }))
 }
 
-/// Sorts the points of each brick by cube, stable; answers for each brick which cubes are occupied.
-fn sort_by_cube(
-    by_brick: &[Placed],
-    first_point: &[u32],
-    placed: &mut [Placed],
-    stage: &Stage,
-) -> Result<Vec<u64>, Error> {
-    let mut masks = zeroed(first_point.len() - 1, "the grid")?;
+/// Sorts the points of each brick by cube, stable; also answers for each brick which cubes are occupied.
+fn sort_by_cube(by_brick: &[Placed], first_point: &[u32], stage: &Stage) -> Result<(Vec<Placed>, Vec<u64>), Error> {
+    let placed = Filling::new(by_brick.len(), "the sorted points")?;
+    let masks = Filling::new(first_point.len() - 1, "the grid")?;
     let blocks = blocks(first_point);
-    let (target, shared) = (Scatter::new(placed), Scatter::new(&mut masks));
     stage.run(blocks.len(), &|block| {
         for brick in blocks[block].clone() {
             let range = first_point[brick] as usize..first_point[brick + 1] as usize;
             // SAFETY: a brick belongs to one block, and its points and its mask to no other brick.
-            unsafe { shared.write(brick, sort_brick(&by_brick[range.clone()], target.slice(range))) };
+            unsafe { masks.write(brick, sort_brick(&by_brick[range.clone()], placed.slice(range))) };
         }
     })?;
-    Ok(masks)
+    // SAFETY: the blocks hold all bricks, and these all points; `sort_brick` writes as many points as it reads.
+    unsafe { Ok((placed.complete(), masks.complete())) }
 }
 
 /// A counting sort over the 64 cubes of a brick; answers which of them are occupied.
-fn sort_brick(points: &[Placed], sorted: &mut [Placed]) -> u64 {
+fn sort_brick(points: &[Placed], sorted: &mut [MaybeUninit<Placed>]) -> u64 {
     let mut next = [0u32; 64];
     for point in points {
         next[cube_in_brick(point.local) as usize] += 1;
@@ -200,7 +199,7 @@ fn sort_brick(points: &[Placed], sorted: &mut [Placed]) -> u64 {
     }
     for point in points {
         let next = &mut next[cube_in_brick(point.local) as usize];
-        sorted[*next as usize] = *point;
+        sorted[*next as usize].write(*point);
         *next += 1;
     }
     mask

@@ -3,15 +3,14 @@
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::{Grid, STEPS, Surroundings};
-use crate::parallel::Scatter;
+use crate::parallel::Filling;
 use crate::pca::Moments;
-use crate::points::zeroed;
 use crate::progress::Stage;
 use bytemuck::Zeroable;
 use glam::Vec3;
 
 /// The plane through the points of a cube and the 26 round it.
-#[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Node {
     /// The unit normal (paper, Eq. 6); zero when the points determine no plane.
     pub normal: Vec3,
@@ -23,7 +22,7 @@ impl Node {
     fn of(surroundings: &Moments) -> Self {
         match surroundings.plane() {
             Some((centroid, normal)) => Self { normal, offset: normal.dot(centroid) },
-            None => Self::zeroed(),
+            None => Self { normal: Vec3::ZERO, offset: 0.0 },
         }
     }
 
@@ -45,8 +44,7 @@ impl Node {
 
 /// The node of every cube, in the order of the grid.
 pub(crate) fn nodes(grid: &Grid, moments: &[Moments], stage: &Stage) -> Result<Vec<Node>, Error> {
-    let mut nodes = zeroed(grid.cubes(), "the nodes")?;
-    let target = Scatter::new(&mut nodes);
+    let nodes = Filling::new(grid.cubes(), "the nodes")?;
     stage.run(grid.blocks.len(), &|block| {
         let mut surroundings = Surroundings::new();
         for brick in grid.blocks[block].clone() {
@@ -60,11 +58,12 @@ pub(crate) fn nodes(grid: &Grid, moments: &[Moments], stage: &Stage) -> Result<V
                     }
                 }
                 // SAFETY: a cube belongs to one brick, and a brick to one block.
-                unsafe { target.write(cube, Node::of(&sum)) };
+                unsafe { nodes.write(cube, Node::of(&sum)) };
             }
         }
     })?;
-    Ok(nodes)
+    // SAFETY: the blocks hold all bricks, and these all cubes.
+    Ok(unsafe { nodes.complete() })
 }
 
 #[cfg(test)]

@@ -4,10 +4,11 @@ use crate::error::Error;
 use crate::grid::{Grid, Placed, Surroundings};
 use crate::lattice::cube_centre;
 use crate::nodes::Node;
-use crate::parallel::Scatter;
-use crate::points::zeroed;
+use crate::parallel::{self, Filling};
+use crate::points::CHUNK;
 use crate::progress::Stage;
 use glam::{Vec3, Vec4};
+use std::mem::MaybeUninit;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// What came out for the points of the input, in its order.
@@ -22,8 +23,13 @@ pub(crate) struct Normals {
 
 /// Interpolates all points; those outside the grid get the zero vector. One pass over the sorted points.
 pub(crate) fn interpolate(grid: &Grid, nodes: &[Node], count: usize, stage: &Stage) -> Result<Normals, Error> {
-    let mut normals = zeroed(3 * count, "the normals")?;
-    let target = Scatter::new(bytemuck::cast_slice_mut::<f32, Vec3>(&mut normals));
+    let normals = Filling::new(count, "the normals")?;
+    if grid.placed.len() < count {
+        // SAFETY: each normal belongs to one chunk, and nothing else is written meanwhile.
+        parallel::each(count.div_ceil(CHUNK), &|i| unsafe {
+            normals.slice(parallel::piece(count, CHUNK, i)).fill(MaybeUninit::new(Vec3::ZERO));
+        });
+    }
     let (all_used, all_resolved) = ([const { AtomicU64::new(0) }; 5], AtomicU64::new(0));
     stage.run(grid.blocks.len(), &|block| {
         let mut surroundings = Surroundings::new();
@@ -37,13 +43,15 @@ pub(crate) fn interpolate(grid: &Grid, nodes: &[Node], count: usize, stage: &Sta
                     used[count] += 1;
                     resolved += u64::from(normal != Vec3::ZERO);
                     // SAFETY: every point of the input stands in the grid once at the most.
-                    unsafe { target.write(point as usize, face(normal)) };
+                    unsafe { normals.write(point as usize, face(normal)) };
                 });
             }
         }
         all_used.iter().zip(used).for_each(|(all, used)| _ = all.fetch_add(used, Relaxed));
         all_resolved.fetch_add(resolved, Relaxed);
     })?;
+    // SAFETY: each point stands in the grid, and was written above, unless all were written before.
+    let normals = bytemuck::cast_vec::<Vec3, [f32; 3]>(unsafe { normals.complete() }).into_flattened();
     let mut nodes_used = all_used.map(AtomicU64::into_inner);
     // Points outside the grid were interpolated from no node either.
     nodes_used[0] += (count - grid.placed.len()) as u64;

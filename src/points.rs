@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::parallel;
-use bytemuck::{Zeroable, cast_slice};
+use bytemuck::cast_slice;
 use glam::{DVec3, Vec3};
 use std::borrow::Cow;
 use std::sync::{Mutex, PoisonError};
@@ -80,14 +80,6 @@ fn check_length(length: usize) -> Result<(), Error> {
 pub(crate) fn reserve<T>(items: &mut Vec<T>, count: usize, what: &str) -> Result<(), Error> {
     let needed = count as u64 * size_of::<T>() as u64;
     items.try_reserve_exact(count).map_err(|_| Error::memory(what, needed))
-}
-
-/// A list of zeros, or how much memory it needed.
-pub(crate) fn zeroed<T: Zeroable + Clone>(count: usize, what: &str) -> Result<Vec<T>, Error> {
-    let mut items = Vec::new();
-    reserve(&mut items, count, what)?;
-    items.resize(count, T::zeroed());
-    Ok(items)
 }
 
 /// The box round all finite points.
