@@ -18,5 +18,5 @@ await main(async () => {
   const { url } = await serve(join(root, 'www', 'dist'), options).catch((error) => {
     throw new Failure(`no server on port ${options.port}: ${error.message}`);
   });
-  console.log(`\nbilinormal: ${url} (end with Ctrl-C)`);
+  console.log(`\nbilinormal: ${url}?sample (end with Ctrl-C)`);
 });
