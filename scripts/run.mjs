@@ -55,10 +55,34 @@ export function run(command, args, { env = {}, quiet = false } = {}) {
 /** What a command prints, or `undefined` if it is missing or fails. */
 export function output(command, args) {
   try {
-    return execFileSync(command, args, { cwd: root, env: environment, encoding: 'utf8', stdio: ['ignore', 'pipe', 'ignore'] });
+    return execFileSync(command, args, {
+      cwd: root,
+      env: environment,
+      encoding: 'utf8',
+      stdio: ['ignore', 'pipe', 'ignore'],
+    });
   } catch {
     return undefined;
   }
+}
+
+/** Runs every check, also after one has failed, sums up, and throws if any failed. */
+export function checkAll(checks) {
+  const results = Object.entries(checks).map(([name, check]) => {
+    tell(`\n${name}`);
+    const start = performance.now();
+    let verdict = 'passed';
+    try {
+      check();
+    } catch (error) {
+      if (!(error instanceof Failure)) throw error;
+      tell(error.message);
+      verdict = 'FAILED';
+    }
+    return { verdict, text: `${verdict}  ${name}, ${((performance.now() - start) / 1000).toFixed(0)} s` };
+  });
+  tell(['', ...results.map(({ text }) => text)].join('\n'));
+  if (results.some(({ verdict }) => verdict === 'FAILED')) throw new Failure('not every check passed');
 }
 
 /** Runs the main function of a script: a `Failure` is told in one line, anything else is a bug and keeps its trace. */

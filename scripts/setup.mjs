@@ -87,7 +87,8 @@ function chromium() {
 export function findBrowser() {
   const chosen = process.env.CHROME;
   if (chosen) {
-    if (!existsSync(chosen)) throw new Failure(`CHROME is ${chosen}, where there is no file; wanted the path of a browser`);
+    if (!existsSync(chosen))
+      throw new Failure(`CHROME is ${chosen}, where there is no file; wanted the path of a browser`);
     return chosen;
   }
   const names = ['chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable'];

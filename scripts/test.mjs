@@ -2,8 +2,8 @@
 
 import { readdirSync } from 'node:fs';
 import { join } from 'node:path';
-import { build, buildPage } from './build.mjs';
-import { Failure, main, root, run, tell } from './run.mjs';
+import { build, buildPage, sizes } from './build.mjs';
+import { Failure, checkAll, main, root, run, tell } from './run.mjs';
 import { findBrowser, setup } from './setup.mjs';
 
 /** Node's own runner, on each test file of a folder. */
@@ -16,6 +16,10 @@ function nodeTests(folder, options = []) {
 
 const border = ['--no-default-features', '--test', 'border'];
 const tests = {
+  'sizes of the downloads': () => {
+    sizes().forEach(({ text }) => tell(text));
+    if (!sizes().every(({ fits }) => fits)) throw new Failure('the npm package is larger than it may be');
+  },
   'crate, native (cargo test)': () => run('cargo', ['test']),
   'border, wasm in Node (wasm-pack test)': () =>
     run('wasm-pack', ['test', '--node', '--mode', 'no-install', '--', ...border]),
@@ -28,21 +32,5 @@ await main(() => {
   setup({ browser: true });
   build();
   buildPage();
-  const results = Object.entries(tests).map(([name, test]) => {
-    tell(`\ntest: ${name}`);
-    const start = performance.now();
-    let failure;
-    try {
-      test();
-    } catch (error) {
-      if (!(error instanceof Failure)) throw error;
-      failure = error;
-    }
-    return { name, failure, seconds: (performance.now() - start) / 1000 };
-  });
-  tell('');
-  for (const { name, failure, seconds } of results) {
-    tell(`${failure ? 'FAILED' : 'passed'}  ${name}, ${seconds.toFixed(0)} s`);
-  }
-  if (results.some(({ failure }) => failure)) throw new Failure('not all tests passed');
+  checkAll(tests);
 });

@@ -2,10 +2,12 @@
 
 use crate::error::Error;
 use crate::lattice::Lattice;
+use crate::parallel::{self, Scatter};
 use crate::points::{CHUNK, Points, reserve};
 use crate::progress::Stage;
-use glam::{IVec3, Vec3};
+use glam::IVec3;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Mutex, PoisonError};
 
 /// The occupied bricks, numbered from 0 in the order z, y, x.
 pub(crate) struct Bricks {
@@ -24,29 +26,40 @@ enum Index {
 
 const FREE: u32 = u32::MAX;
 
+/// The key of a point that lies in no brick.
+pub(crate) const OUTSIDE: u32 = u32::MAX;
+
 impl Bricks {
-    /// Finds the bricks of all points. One pass, parallel.
-    pub fn find(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<Self, Error> {
+    /// Finds the bricks of all points, and for each point the number of its brick. Two passes, parallel.
+    pub fn find(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
+        let mut keys: Vec<u32> = Vec::new();
+        reserve(&mut keys, points.len(), "the sorting keys")?;
+        keys.resize(points.len(), OUTSIDE);
         let size = lattice.bricks();
         let volume = size.x as u128 * size.y as u128 * size.z as u128;
         // At most 3 bytes a point. A surface with a few points in a cube needs a tenth of that.
         let limit = (16 * points.len() as u128).clamp(1 << 20, 1 << 31);
-        if volume <= limit {
-            Self::in_box(points, lattice, size, stage)
+        let bricks = if volume <= limit {
+            Self::in_box(points, lattice, size, &mut keys, stage)?
         } else {
-            Self::in_table(points, lattice, stage)
-        }
+            Self::in_table(points, lattice, &mut keys, stage)?
+        };
+        Ok((bricks, keys))
     }
 
-    fn in_box(points: &Points, lattice: &Lattice, size: IVec3, stage: &Stage) -> Result<Self, Error> {
+    fn in_box(points: &Points, lattice: &Lattice, size: IVec3, keys: &mut [u32], stage: &Stage) -> Result<Self, Error> {
         let count = (size.x as usize * size.y as usize * size.z as usize).div_ceil(64);
         let mut bits: Vec<AtomicU64> = Vec::new();
         reserve(&mut bits, count, "the grid")?;
         bits.resize_with(count, AtomicU64::default);
-        stage.run(points.positions.chunks(CHUNK).collect(), |chunk: &[Vec3]| {
-            for &point in chunk {
+        let target = Scatter::new(keys);
+        stage.part(0.0..0.6).run(points.chunks(), &|i| {
+            // SAFETY: each chunk of points is one task, and its keys are that task's.
+            let keys = unsafe { target.slice(parallel::piece(points.len(), CHUNK, i)) };
+            for (&point, key) in points.chunk(i).iter().zip(keys) {
                 if let Some((brick, _)) = lattice.locate(point) {
                     let slot = slot(size, brick);
+                    *key = slot as u32;
                     let (word, bit) = (&bits[slot / 64], 1 << (slot % 64));
                     // Reading first: most points find their bit set, and then no thread waits for another.
                     if word.load(Relaxed) & bit == 0 {
@@ -69,13 +82,24 @@ impl Bricks {
         for (i, &word) in bits.iter().enumerate() {
             places.extend(set_bits(word).map(|bit| place(size, 64 * i + bit as usize)));
         }
+
+        stage.part(0.6..1.0).run(points.chunks(), &|i| {
+            // SAFETY: as above.
+            for key in unsafe { target.slice(parallel::piece(points.len(), CHUNK, i)) } {
+                if *key != OUTSIDE {
+                    *key = rank(&bits, &before, *key as usize);
+                }
+            }
+        })?;
         Ok(Self { places, index: Index::Box { size, bits, before } })
     }
 
-    fn in_table(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<Self, Error> {
-        let found = stage.run(points.positions.chunks(CHUNK).collect(), |chunk: &[Vec3]| {
+    fn in_table(points: &Points, lattice: &Lattice, keys: &mut [u32], stage: &Stage) -> Result<Self, Error> {
+        // Sorted below, so the order in which the chunks come does not matter.
+        let found = Mutex::new(Vec::new());
+        stage.part(0.0..0.5).run(points.chunks(), &|i| {
             let mut places: Vec<IVec3> = Vec::new();
-            for &point in chunk {
+            for &point in points.chunk(i) {
                 if let Some((brick, _)) = lattice.locate(point)
                     && places.last() != Some(&brick)
                 {
@@ -83,9 +107,9 @@ impl Bricks {
                 }
             }
             sort(&mut places);
-            places
+            found.lock().unwrap_or_else(PoisonError::into_inner).append(&mut places);
         })?;
-        let mut places = found.concat();
+        let mut places = found.into_inner().unwrap_or_else(PoisonError::into_inner);
         sort(&mut places);
         places.shrink_to_fit();
 
@@ -100,7 +124,18 @@ impl Bricks {
             }
             slots[slot] = number as u32;
         }
-        Ok(Self { places, index: Index::Table { slots } })
+
+        let bricks = Self { places, index: Index::Table { slots } };
+        let target = Scatter::new(keys);
+        stage.part(0.5..1.0).run(points.chunks(), &|i| {
+            // SAFETY: each chunk of points is one task, and its keys are that task's.
+            let keys = unsafe { target.slice(parallel::piece(points.len(), CHUNK, i)) };
+            for (&point, key) in points.chunk(i).iter().zip(keys) {
+                let number = lattice.locate(point).and_then(|(brick, _)| bricks.number(brick));
+                *key = number.unwrap_or(OUTSIDE);
+            }
+        })?;
+        Ok(bricks)
     }
 
     /// How many bricks there are.
@@ -116,8 +151,7 @@ impl Bricks {
                     return None;
                 }
                 let slot = slot(*size, brick);
-                let (word, bit) = (bits[slot / 64], 1 << (slot % 64));
-                (word & bit != 0).then(|| before[slot / 64] + (word & (bit - 1)).count_ones())
+                (bits[slot / 64] >> (slot % 64) & 1 == 1).then(|| rank(bits, before, slot))
             }
             Index::Table { slots } => {
                 let mut slot = hash(brick) & (slots.len() - 1);
@@ -140,6 +174,11 @@ pub(crate) fn set_bits(mut bits: u64) -> impl Iterator<Item = u32> {
         bits &= bits.wrapping_sub(1);
         (bit < 64).then_some(bit)
     })
+}
+
+/// How many bricks come before a slot.
+fn rank(bits: &[u64], before: &[u32], slot: usize) -> u32 {
+    before[slot / 64] + (bits[slot / 64] & ((1 << (slot % 64)) - 1)).count_ones()
 }
 
 /// The paper's key (Eq. 4), of a brick instead of a cube.

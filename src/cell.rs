@@ -3,8 +3,9 @@
 use crate::error::Error;
 use crate::options::Cell;
 use crate::parallel;
-use crate::points::{Bounds, Bulk, CHUNK, Points};
-use glam::{DVec3, UVec3, Vec3};
+use crate::points::{Bounds, Bulk, Points};
+use glam::{DVec3, UVec3};
+use std::sync::{Mutex, PoisonError};
 
 /// Points in an occupied cube that 'auto' aims at: with the 26 cubes round it some 36 points, as accurate on clean
 /// surfaces as 30 nearest neighbours.
@@ -129,18 +130,23 @@ impl Probes {
 
     /// Points in an occupied cube for the probes' edge halved 0 to [`LEVELS`] times.
     fn count(&self, points: &Points) -> Vec<f64> {
-        // The probe of each point, then a Morton code: points in one cube of any level share the first bits.
-        let tasks: Vec<&[Vec3]> = points.positions.chunks(CHUNK).collect();
-        let mut found: Vec<u64> = parallel::map(tasks, |chunk| {
-            let cubes = chunk.iter().filter(|p| p.is_finite()).map(|p| self.cube(p.as_dvec3()));
-            cubes
-                .filter_map(|(cube, place)| Some((self.find(cube)?, place)))
-                .map(|(probe, place)| {
-                    u64::from(probe) << (3 * LEVELS) | u64::from(morton((place * f64::from(1 << LEVELS)).as_uvec3()))
-                })
-                .collect::<Vec<_>>()
-        })
-        .concat();
+        // The probe of each point, then a Morton code: points in one cube of any level share the first bits. Sorted below,
+        // so the order in which the chunks come does not matter.
+        let found = Mutex::new(Vec::new());
+        parallel::each(points.chunks(), &|i| {
+            let mut codes: Vec<u64> = Vec::new();
+            for point in points.chunk(i) {
+                let (cube, place) = self.cube(point.as_dvec3());
+                if let Some(probe) = self.find(cube)
+                    && point.is_finite()
+                {
+                    let place = morton((place * f64::from(1 << LEVELS)).as_uvec3());
+                    codes.push(u64::from(probe) << (3 * LEVELS) | u64::from(place));
+                }
+            }
+            found.lock().unwrap_or_else(PoisonError::into_inner).append(&mut codes);
+        });
+        let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
         found.sort_unstable();
 
         let mut share = vec![0.0; LEVELS as usize + 1];

@@ -50,6 +50,8 @@ impl Error {
     }
 
     /// A [`Error::Limit`] for an allocation that the system refused.
+    #[cold]
+    #[inline(never)]
     pub(crate) fn memory(what: &str, needed: u64) -> Self {
         Self::Limit {
             message: format!("{what} does not fit into memory; use fewer points, or a 64-bit native build"),

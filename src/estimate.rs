@@ -74,10 +74,8 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     let lattice = Lattice::new(bounds.min.as_dvec3(), bounds.max.as_dvec3(), centre, edge);
     laps.end("cellSize");
 
-    let grid = Grid::sort(points, &lattice, &progress.stage("sort", 0.06..0.45))?;
+    let (grid, moments) = Grid::sort(points, &lattice, &progress.stage("sort", 0.06..0.55))?;
     laps.end("sort");
-    let moments = grid.moments(&progress.stage("sums", 0.45..0.55))?;
-    laps.end("sums");
     let nodes = nodes::nodes(&grid, &moments, &progress.stage("nodes", 0.55..0.65))?;
     drop(moments);
     laps.end("nodes");

@@ -1,22 +1,18 @@
 //! Points sorted into cubes, and the moments of each cube.
 
-use crate::bricks::{Bricks, set_bits};
+use crate::bricks::{Bricks, OUTSIDE, set_bits};
 use crate::error::Error;
 use crate::lattice::{Lattice, cube_centre, cube_in_brick};
 use crate::parallel::{self, Scatter};
 use crate::pca::Moments;
-use crate::points::{CHUNK, Points, reserve};
+use crate::points::{CHUNK, Points, reserve, zeroed};
 use crate::progress::Stage;
-use bytemuck::{Pod, Zeroable};
+use bytemuck::Zeroable;
 use glam::{IVec3, Vec3};
 use std::ops::Range;
 
-/// The number of a brick that no point lies in.
-const OUTSIDE: u32 = u32::MAX;
-
 /// A point in its brick.
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C)]
+#[derive(Clone, Copy, Debug, Zeroable)]
 pub(crate) struct Placed {
     /// The place in the brick, in edges, 0 to 4.
     pub local: Vec3,
@@ -40,14 +36,20 @@ pub(crate) struct Grid {
     pub cube_end: Vec<u32>,
     /// The points within the grid, sorted.
     pub placed: Vec<Placed>,
+    /// Runs of bricks: the tasks of the later stages.
+    pub blocks: Vec<Range<usize>>,
 }
 
 impl Grid {
-    /// Sorts the points into cubes: three passes over the input, each parallel, and one over the sorted points.
-    pub fn sort(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<Self, Error> {
-        let bricks = Bricks::find(points, lattice, &stage.part(0.0..0.2))?;
-        let (first_point, mut placed) = sort_into_bricks(points, lattice, &bricks, stage)?;
-        let (masks, cube_end) = sort_bricks(&first_point, &mut placed, &stage.part(0.8..1.0))?;
+    /// Sorts the points into cubes, and finds the moments of every cube (the ten sums behind the paper's Eq. 5 and 6).
+    /// Four passes over the points, each parallel.
+    pub fn sort(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<(Self, Vec<Moments>), Error> {
+        let (bricks, keys) = Bricks::find(points, lattice, &stage.part(0.0..0.35))?;
+        let (first_point, by_brick) = sort_by_brick(points, lattice, &bricks, keys, &stage.part(0.35..0.75))?;
+        let mut placed = zeroed(by_brick.len(), "the sorted points")?;
+        let masks = sort_by_cube(&by_brick, &first_point, &mut placed, &stage.part(0.75..0.9))?;
+        drop(by_brick);
+
         let mut first_cube = Vec::new();
         reserve(&mut first_cube, masks.len() + 1, "the grid")?;
         let mut total = 0;
@@ -56,7 +58,11 @@ impl Grid {
             total += mask.count_ones();
             first_cube.push(total);
         }
-        Ok(Self { bricks, masks, first_cube, first_point, cube_end, placed })
+        let cube_end = zeroed(total as usize, "the cubes")?;
+        let blocks = blocks(&first_point);
+        let mut grid = Self { bricks, masks, first_cube, first_point, cube_end, placed, blocks };
+        let moments = grid.sum(&stage.part(0.9..1.0))?;
+        Ok((grid, moments))
     }
 
     /// How many cubes hold points.
@@ -64,19 +70,26 @@ impl Grid {
         self.cube_end.len()
     }
 
-    /// The moments of every cube (the ten sums behind the paper's Eq. 5 and 6).
-    pub fn moments(&self, stage: &Stage) -> Result<Vec<Moments>, Error> {
-        let mut moments = Vec::new();
-        reserve(&mut moments, self.cubes(), "the cubes")?;
-        moments.resize(self.cubes(), Moments::default());
-        let blocks = blocks(&self.first_point);
-        let pieces = split(&mut moments, blocks.iter().map(|bricks| self.first_cube[bricks.end] as usize));
-        stage.run(blocks.into_iter().zip(pieces).collect(), |(bricks, moments): (Range<usize>, &mut [Moments])| {
-            let mut moments = moments.iter_mut();
-            for brick in bricks {
-                for ((points, bit), moments) in self.cubes_of(brick).zip(&mut moments) {
+    /// Sums up every cube, and notes where its points end.
+    fn sum(&mut self, stage: &Stage) -> Result<Vec<Moments>, Error> {
+        let mut moments = zeroed(self.cubes(), "the cubes")?;
+        let (sums, ends) = (Scatter::new(&mut moments), Scatter::new(&mut self.cube_end));
+        let (placed, first_point, first_cube) = (&self.placed, &self.first_point, &self.first_cube);
+        let (masks, blocks) = (&self.masks, &self.blocks);
+        stage.run(blocks.len(), &|block| {
+            for brick in blocks[block].clone() {
+                let mut start = first_point[brick] as usize;
+                let last = first_point[brick + 1] as usize;
+                for (cube, bit) in (first_cube[brick] as usize..).zip(set_bits(masks[brick])) {
+                    let points = &placed[start..last];
+                    let length = points.iter().take_while(|point| cube_in_brick(point.local) == bit).count();
                     let centre = cube_centre(bit);
-                    *moments = Moments::of(points.iter().map(|placed| placed.local - centre));
+                    start += length;
+                    // SAFETY: a cube belongs to one brick, and a brick to one block.
+                    unsafe {
+                        sums.write(cube, Moments::of(points[..length].iter().map(|point| point.local - centre)));
+                        ends.write(cube, start as u32);
+                    }
                 }
             }
         })?;
@@ -93,42 +106,34 @@ impl Grid {
             (points, bit)
         })
     }
-
-    /// Runs of bricks that hold some ten thousand points each: the tasks of the later stages.
-    pub fn blocks(&self) -> Vec<Range<usize>> {
-        blocks(&self.first_point)
-    }
 }
 
 /// Sorts the points by brick: a counting sort, stable, so its result does not depend on how the input is cut.
-fn sort_into_bricks(
+fn sort_by_brick(
     points: &Points,
     lattice: &Lattice,
     bricks: &Bricks,
+    keys: Vec<u32>,
     stage: &Stage,
 ) -> Result<(Vec<u32>, Vec<Placed>), Error> {
     let count = points.len();
     // Each piece of the input counts for itself. Few pieces when there are many bricks: at most 8 bytes a point.
     let pieces = (2 * count / bricks.len().max(1)).clamp(1, (4 * parallel::threads()).max(16));
-    let piece = count.div_ceil(pieces).max(CHUNK);
+    let size = count.div_ceil(pieces).max(CHUNK);
+    let pieces = count.div_ceil(size);
+    let of_piece = |i: usize| i * bricks.len()..(i + 1) * bricks.len();
 
-    let mut keys: Vec<u32> = Vec::new();
-    reserve(&mut keys, count, "the sorting keys")?;
-    keys.resize(count, OUTSIDE);
-    let tasks = points.positions.chunks(piece).zip(keys.chunks_mut(piece)).collect();
-    let mut counts = stage.part(0.2..0.4).run(tasks, |(positions, keys): (&[Vec3], &mut [u32])| {
-        let mut counts: Vec<u32> = Vec::new();
-        reserve(&mut counts, bricks.len(), "the grid")?;
-        counts.resize(bricks.len(), 0);
-        for (key, &point) in keys.iter_mut().zip(positions) {
-            if let Some(number) = lattice.locate(point).and_then(|(brick, _)| bricks.number(brick)) {
-                *key = number;
-                counts[number as usize] += 1;
+    let mut counts: Vec<u32> = zeroed(pieces * bricks.len(), "the grid")?;
+    let shared = Scatter::new(&mut counts);
+    stage.part(0.0..0.15).run(pieces, &|i| {
+        // SAFETY: each piece counts in its own part.
+        let counts = unsafe { shared.slice(of_piece(i)) };
+        for &key in &keys[parallel::piece(count, size, i)] {
+            if key != OUTSIDE {
+                counts[key as usize] += 1;
             }
         }
-        Ok(counts)
     })?;
-    let mut counts = counts.drain(..).collect::<Result<Vec<Vec<u32>>, Error>>()?;
 
     // Where each piece writes its first point of each brick.
     let mut first_point = Vec::new();
@@ -136,83 +141,61 @@ fn sort_into_bricks(
     let mut total = 0;
     for brick in 0..bricks.len() {
         first_point.push(total);
-        for counts in &mut counts {
-            total += std::mem::replace(&mut counts[brick], total);
+        for piece in 0..pieces {
+            total += std::mem::replace(&mut counts[piece * bricks.len() + brick], total);
         }
     }
     first_point.push(total);
 
-    let mut placed: Vec<Placed> = Vec::new();
-    reserve(&mut placed, total as usize, "the sorted points")?;
-    placed.resize(total as usize, Placed::zeroed());
-    let target = Scatter::new(&mut placed);
-    let tasks = points.positions.chunks(piece).zip(keys.chunks(piece)).zip(counts).enumerate().collect();
-    stage.part(0.4..0.8).run(tasks, |(i, ((positions, keys), mut next)): (usize, ((&[Vec3], &[u32]), Vec<u32>))| {
-        for (j, (&point, &key)) in positions.iter().zip(keys).enumerate() {
-            if key != OUTSIDE
-                && let Some((_, local)) = lattice.locate(point)
+    let mut placed: Vec<Placed> = zeroed(total as usize, "the sorted points")?;
+    let (shared, target) = (Scatter::new(&mut counts), Scatter::new(&mut placed));
+    stage.part(0.15..1.0).run(pieces, &|i| {
+        // SAFETY: each piece counts on in its own part.
+        let next = unsafe { shared.slice(of_piece(i)) };
+        for point in parallel::piece(count, size, i) {
+            let key = keys[point] as usize;
+            if let Some(next) = next.get_mut(key)
+                && let Some((_, local)) = lattice.locate(points.positions[point])
             {
-                let place = next[key as usize];
-                next[key as usize] += 1;
-                let point = (i * piece + j) as u32;
-                // SAFETY: `place` runs through the part of this piece and this brick, which the prefix sum above gave
-                // to no other piece and no other brick.
-                unsafe { target.write(place as usize, Placed { local, point }) };
+                // SAFETY: `next` runs through the part of this piece and this brick, which the sums above gave to no
+                // other piece and no other brick.
+                unsafe { target.write(*next as usize, Placed { local, point: point as u32 }) };
+                *next += 1;
             }
         }
     })?;
     Ok((first_point, placed))
 }
 
-/// Sorts the points of each brick by cube, stable; answers for each brick which cubes are occupied, and for each cube
-/// where its points end.
-fn sort_bricks(first_point: &[u32], placed: &mut [Placed], stage: &Stage) -> Result<(Vec<u64>, Vec<u32>), Error> {
+/// Sorts the points of each brick by cube, stable; answers for each brick which cubes are occupied.
+fn sort_by_cube(
+    by_brick: &[Placed],
+    first_point: &[u32],
+    placed: &mut [Placed],
+    stage: &Stage,
+) -> Result<Vec<u64>, Error> {
+    let mut masks = zeroed(first_point.len() - 1, "the grid")?;
     let blocks = blocks(first_point);
-    let pieces = split(placed, blocks.iter().map(|bricks| first_point[bricks.end] as usize));
-    let tasks = blocks.into_iter().zip(pieces).collect();
-    let sorted = stage.run(tasks, |(bricks, mut placed): (Range<usize>, &mut [Placed])| {
-        let mut scratch: Vec<Placed> = Vec::new();
-        let (mut masks, mut ends) = (Vec::with_capacity(bricks.len()), Vec::with_capacity(16 * bricks.len()));
-        for brick in bricks {
-            let (points, rest) = placed.split_at_mut((first_point[brick + 1] - first_point[brick]) as usize);
-            placed = rest;
-            scratch.clear();
-            if scratch.capacity() < points.len() {
-                reserve(&mut scratch, points.len(), "the sorted points")?;
-            }
-            scratch.extend_from_slice(points);
-            let counts = sort_brick(&scratch, points);
-            let mut end = first_point[brick];
-            let mut mask = 0;
-            for (bit, count) in counts.into_iter().enumerate().filter(|(_, count)| *count > 0) {
-                mask |= 1 << bit;
-                end += count;
-                ends.push(end);
-            }
-            masks.push(mask);
+    let (target, shared) = (Scatter::new(placed), Scatter::new(&mut masks));
+    stage.run(blocks.len(), &|block| {
+        for brick in blocks[block].clone() {
+            let range = first_point[brick] as usize..first_point[brick + 1] as usize;
+            // SAFETY: a brick belongs to one block, and its points and its mask to no other brick.
+            unsafe { shared.write(brick, sort_brick(&by_brick[range.clone()], target.slice(range))) };
         }
-        Ok((masks, ends))
     })?;
-    let sorted = sorted.into_iter().collect::<Result<Vec<_>, Error>>()?;
-    let (mut masks, mut ends) = (Vec::new(), Vec::new());
-    reserve(&mut masks, first_point.len() - 1, "the grid")?;
-    reserve(&mut ends, sorted.iter().map(|(_, ends)| ends.len()).sum(), "the cubes")?;
-    for (block_masks, block_ends) in sorted {
-        masks.extend(block_masks);
-        ends.extend(block_ends);
-    }
-    Ok((masks, ends))
+    Ok(masks)
 }
 
-/// A counting sort over the 64 cubes of a brick; answers the number of points in each.
-fn sort_brick(points: &[Placed], sorted: &mut [Placed]) -> [u32; 64] {
-    let mut counts = [0; 64];
+/// A counting sort over the 64 cubes of a brick; answers which of them are occupied.
+fn sort_brick(points: &[Placed], sorted: &mut [Placed]) -> u64 {
+    let mut next = [0u32; 64];
     for point in points {
-        counts[cube_in_brick(point.local) as usize] += 1;
+        next[cube_in_brick(point.local) as usize] += 1;
     }
-    let mut next = counts;
-    let mut total = 0;
-    for next in &mut next {
+    let (mut mask, mut total) = (0, 0);
+    for (cube, next) in next.iter_mut().enumerate() {
+        mask |= u64::from(*next > 0) << cube;
         total += std::mem::replace(next, total);
     }
     for point in points {
@@ -220,9 +203,10 @@ fn sort_brick(points: &[Placed], sorted: &mut [Placed]) -> [u32; 64] {
         sorted[*next as usize] = *point;
         *next += 1;
     }
-    counts
+    mask
 }
 
+/// Runs of bricks that hold some ten thousand points each: the tasks of the later stages.
 fn blocks(first_point: &[u32]) -> Vec<Range<usize>> {
     const POINTS: u32 = 1 << 14;
     const BRICKS: usize = 1 << 10;
@@ -236,17 +220,6 @@ fn blocks(first_point: &[u32]) -> Vec<Range<usize>> {
         }
     }
     blocks
-}
-
-/// Cuts a slice at the given ends, the last of which is its length.
-pub(crate) fn split<T>(mut slice: &mut [T], ends: impl Iterator<Item = usize>) -> Vec<&mut [T]> {
-    let mut start = 0;
-    ends.map(|end| {
-        let (piece, rest) = std::mem::take(&mut slice).split_at_mut(end - start);
-        (slice, start) = (rest, end);
-        piece
-    })
-    .collect()
 }
 
 /// The cubes in and one deep around a brick: 6x6x6 of them.

@@ -1,15 +1,17 @@
 //! Interpolation nodes: one for each cube, where the plane of its surroundings passes under its centre.
 
+use crate::bricks::set_bits;
 use crate::error::Error;
-use crate::grid::{Grid, Surroundings, split, steps};
+use crate::grid::{Grid, Surroundings, steps};
+use crate::parallel::Scatter;
 use crate::pca::Moments;
-use crate::points::reserve;
+use crate::points::zeroed;
 use crate::progress::Stage;
+use bytemuck::Zeroable;
 use glam::Vec3;
-use std::ops::Range;
 
 /// The plane through the points of a cube and the 26 round it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
 pub(crate) struct Node {
     /// The unit normal (paper, Eq. 6); zero when the points determine no plane.
     pub normal: Vec3,
@@ -21,7 +23,7 @@ impl Node {
     fn of(surroundings: &Moments) -> Self {
         match surroundings.plane() {
             Some((centroid, normal)) => Self { normal, offset: normal.dot(centroid) },
-            None => Self::default(),
+            None => Self::zeroed(),
         }
     }
 
@@ -43,26 +45,21 @@ impl Node {
 
 /// The node of every cube, in the order of the grid.
 pub(crate) fn nodes(grid: &Grid, moments: &[Moments], stage: &Stage) -> Result<Vec<Node>, Error> {
-    let mut nodes = Vec::new();
-    reserve(&mut nodes, grid.cubes(), "the nodes")?;
-    nodes.resize(grid.cubes(), Node::default());
-    let blocks = grid.blocks();
-    let pieces = split(&mut nodes, blocks.iter().map(|bricks| grid.first_cube[bricks.end] as usize));
-    stage.run(blocks.into_iter().zip(pieces).collect(), |(bricks, nodes): (Range<usize>, &mut [Node])| {
+    let mut nodes = zeroed(grid.cubes(), "the nodes")?;
+    let target = Scatter::new(&mut nodes);
+    stage.run(grid.blocks.len(), &|block| {
         let mut surroundings = Surroundings::new();
-        let mut nodes = nodes.iter_mut();
-        for brick in bricks {
+        for brick in grid.blocks[block].clone() {
             surroundings.look(grid, brick);
-            for bit in crate::bricks::set_bits(grid.masks[brick]) {
-                let mut sum = Moments::default();
+            for (cube, bit) in (grid.first_cube[brick] as usize..).zip(set_bits(grid.masks[brick])) {
+                let mut sum = Moments::zeroed();
                 for step in steps() {
                     if let Some(cube) = surroundings.cube(bit, step) {
                         sum.add_shifted(&moments[cube], step);
                     }
                 }
-                if let Some(node) = nodes.next() {
-                    *node = Node::of(&sum);
-                }
+                // SAFETY: a cube belongs to one brick, and a brick to one block.
+                unsafe { target.write(cube, Node::of(&sum)) };
             }
         }
     })?;
@@ -98,8 +95,7 @@ mod tests {
             let lattice = Lattice::new(min, max, min, edge);
             let progress = Progress::silent();
             let stage = progress.stage("test", 0.0..1.0);
-            let grid = Grid::sort(&points, &lattice, &stage).unwrap();
-            let moments = grid.moments(&stage).unwrap();
+            let (grid, moments) = Grid::sort(&points, &lattice, &stage).unwrap();
             let nodes = nodes(&grid, &moments, &stage).unwrap();
 
             let cube = |p: &Vec3| (p.as_dvec3() / edge).floor().as_ivec3();

@@ -5,10 +5,11 @@ use crate::grid::{Grid, Placed, Surroundings, steps};
 use crate::lattice::cube_centre;
 use crate::nodes::Node;
 use crate::parallel::Scatter;
-use crate::points::reserve;
+use crate::points::zeroed;
 use crate::progress::Stage;
+use bytemuck::Zeroable;
 use glam::{IVec3, Vec3, Vec4};
-use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// What came out for the points of the input, in its order.
 pub(crate) struct Normals {
@@ -22,52 +23,30 @@ pub(crate) struct Normals {
 
 /// Interpolates all points; those outside the grid get the zero vector. One pass over the sorted points.
 pub(crate) fn interpolate(grid: &Grid, nodes: &[Node], count: usize, stage: &Stage) -> Result<Normals, Error> {
-    let mut normals = Vec::new();
-    reserve(&mut normals, 3 * count, "the normals")?;
-    normals.resize(3 * count, 0.0);
+    let mut normals = zeroed(3 * count, "the normals")?;
     let target = Scatter::new(bytemuck::cast_slice_mut::<f32, Vec3>(&mut normals));
-    let tallies = stage.run(grid.blocks(), |bricks: Range<usize>| {
+    let (all_used, all_resolved) = ([const { AtomicU64::new(0) }; 5], AtomicU64::new(0));
+    stage.run(grid.blocks.len(), &|block| {
         let mut surroundings = Surroundings::new();
-        let mut tally = Tally::default();
-        for brick in bricks {
+        let (mut used, mut resolved) = ([0; 5], 0);
+        for brick in grid.blocks[block].clone() {
             surroundings.look(grid, brick);
             for (points, bit) in grid.cubes_of(brick) {
-                let cube = Cube::new(&surroundings, nodes, bit);
-                let mut resolve = |normal: Vec3, used: usize, point: u32| {
-                    tally.used[used] += 1;
-                    tally.resolved += u64::from(normal != Vec3::ZERO);
+                Cube::new(&surroundings, nodes, bit).interpolate(points, |normal, count, point| {
+                    used[count] += 1;
+                    resolved += u64::from(normal != Vec3::ZERO);
                     // SAFETY: every point of the input stands in the grid once at the most.
                     unsafe { target.write(point as usize, face(normal)) };
-                };
-                match cube.axis {
-                    0 => cube.interpolate::<0>(points, &mut resolve),
-                    1 => cube.interpolate::<1>(points, &mut resolve),
-                    _ => cube.interpolate::<2>(points, &mut resolve),
-                }
+                });
             }
         }
-        tally
+        all_used.iter().zip(used).for_each(|(all, used)| _ = all.fetch_add(used, Relaxed));
+        all_resolved.fetch_add(resolved, Relaxed);
     })?;
-    let tally = tallies.into_iter().fold(Tally::default(), Tally::add);
-    let mut nodes_used = tally.used;
+    let mut nodes_used = all_used.map(AtomicU64::into_inner);
     // Points outside the grid were interpolated from no node either.
     nodes_used[0] += (count - grid.placed.len()) as u64;
-    Ok(Normals { normals, nodes_used, unresolved: count as u64 - tally.resolved })
-}
-
-/// How many points came out how.
-#[derive(Default)]
-struct Tally {
-    used: [u64; 5],
-    resolved: u64,
-}
-
-impl Tally {
-    fn add(mut self, other: Self) -> Self {
-        self.used.iter_mut().zip(other.used).for_each(|(sum, n)| *sum += n);
-        self.resolved += other.resolved;
-        self
-    }
+    Ok(Normals { normals, nodes_used, unresolved: count as u64 - all_resolved.into_inner() })
 }
 
 /// All that the points of one cube share: its node and the 26 round it, sorted into columns along one axis.
@@ -95,7 +74,7 @@ struct Seen {
 
 impl<'a> Cube<'a> {
     fn new(surroundings: &'a Surroundings, nodes: &'a [Node], bit: u32) -> Self {
-        let own = surroundings.cube(bit, IVec3::ZERO).map_or(Node::default(), |cube| nodes[cube]);
+        let own = surroundings.cube(bit, IVec3::ZERO).map_or(Node::zeroed(), |cube| nodes[cube]);
         let axis = own.normal.abs().max_position();
         let mut cube = Self { surroundings, nodes, bit, own, axis, columns: [[None; 9]; 2] };
         if own.has_plane() {
@@ -137,13 +116,15 @@ impl<'a> Cube<'a> {
     }
 
     /// Calls `resolve(normal, nodes used, number of the point)` for each point of the cube.
-    fn interpolate<const AXIS: usize>(&self, points: &[Placed], resolve: &mut impl FnMut(Vec3, usize, u32)) {
+    fn interpolate(&self, points: &[Placed], mut resolve: impl FnMut(Vec3, usize, u32)) {
+        let (axis_u, axis_v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
         // What the points of each octant share, from when the first of them asks.
         let mut octants = [const { None }; 8];
         let centre = cube_centre(self.bit);
         for placed in points {
             let point = placed.local - centre;
-            let (u, v, w) = (point[(AXIS + 1) % 3], point[(AXIS + 2) % 3], point[AXIS]);
+            let along = point.to_array();
+            let (u, v, w) = (along[axis_u], along[axis_v], along[self.axis]);
             let number = usize::from(u >= 0.0) + 2 * usize::from(v >= 0.0) + 4 * usize::from(w >= 0.0);
             let octant = octants[number].get_or_insert_with(|| Octant::new(&self.columns[number / 4], number));
             let normal = match octant.used {

@@ -1,6 +1,6 @@
 //! One neighbourhood: its moments, their shift by whole cubes, and the plane that fits it best.
 
-use bytemuck::{Pod, Zeroable};
+use bytemuck::Zeroable;
 use glam::{DVec3, IVec3, Vec3};
 
 /// A neighbourhood whose second eigenvalue is below this (in square edges, and against the first) lies on one line
@@ -11,8 +11,7 @@ const LINE: f64 = 1e-6;
 ///
 /// Single precision is enough: the coordinates stay within 1.5 even after a shift, so the covariance is off by some
 /// 1e-7 square edges, and the normal by some 1e-6 radians.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Zeroable)]
 pub(crate) struct Moments {
     pub count: f32,
     pub sum: Vec3,

@@ -2,9 +2,10 @@
 
 use crate::error::Error;
 use crate::parallel;
-use bytemuck::cast_slice;
+use bytemuck::{Zeroable, cast_slice};
 use glam::{DVec3, Vec3};
 use std::borrow::Cow;
+use std::sync::{Mutex, PoisonError};
 
 /// How many points a robust look at a cloud samples.
 const SAMPLE: usize = 4096;
@@ -47,6 +48,16 @@ impl<'a> Points<'a> {
         self.positions.len()
     }
 
+    /// How many chunks of [`CHUNK`] points there are: the tasks of passes over the input.
+    pub(crate) fn chunks(&self) -> usize {
+        self.len().div_ceil(CHUNK)
+    }
+
+    /// The points of one chunk.
+    pub(crate) fn chunk(&self, number: usize) -> &[Vec3] {
+        &self.positions[parallel::piece(self.len(), CHUNK, number)]
+    }
+
     /// Whether there are no points at all.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
@@ -66,6 +77,14 @@ pub(crate) fn reserve<T>(items: &mut Vec<T>, count: usize, what: &str) -> Result
     items.try_reserve_exact(count).map_err(|_| Error::memory(what, needed))
 }
 
+/// A list of zeros, or how much memory it needed.
+pub(crate) fn zeroed<T: Zeroable + Clone>(count: usize, what: &str) -> Result<Vec<T>, Error> {
+    let mut items = Vec::new();
+    reserve(&mut items, count, what)?;
+    items.resize(count, T::zeroed());
+    Ok(items)
+}
+
 /// The box round all finite points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Bounds {
@@ -80,9 +99,14 @@ impl Bounds {
 
     /// One pass over the points.
     pub fn of(points: &Points) -> Self {
-        parallel::map(points.positions.chunks(CHUNK).collect(), Self::of_chunk)
-            .into_iter()
-            .fold(Self::EMPTY, Self::join)
+        // Neither minima nor counts depend on the order in which the chunks come.
+        let bounds = Mutex::new(Self::EMPTY);
+        parallel::each(points.chunks(), &|i| {
+            let chunk = Self::of_chunk(points.chunk(i));
+            let mut bounds = bounds.lock().unwrap_or_else(PoisonError::into_inner);
+            *bounds = bounds.join(chunk);
+        });
+        bounds.into_inner().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The sides of the box; zero when no point is finite.

@@ -53,20 +53,19 @@ pub(crate) struct Stage<'a> {
 }
 
 impl Stage<'_> {
-    /// Runs the tasks in parallel and collects their answers in order. Between batches of tasks it tells the observer
-    /// and lets it stop the call: with tasks of some ten thousand points, every few milliseconds.
-    pub fn run<T: Send, R: Send>(&self, tasks: Vec<T>, work: impl Fn(T) -> R + Send + Sync) -> Result<Vec<R>, Error> {
-        let count = tasks.len();
+    /// Runs `work` for each number below `count`, in parallel. Between batches it tells the observer and lets it stop
+    /// the call: with tasks of some ten thousand points, every few milliseconds.
+    pub fn run(&self, count: usize, work: &(dyn Fn(usize) + Sync)) -> Result<(), Error> {
         let batch = 8 * parallel::threads();
-        let mut answers = Vec::with_capacity(count);
-        let mut tasks = tasks.into_iter();
-        while answers.len() < count {
-            let done = answers.len() as f64 / count as f64;
-            self.progress.update(self.phase, self.share.start + (self.share.end - self.share.start) * done)?;
-            answers.extend(parallel::map(tasks.by_ref().take(batch).collect(), &work));
+        let mut done = 0;
+        while done < count {
+            let fraction = done as f64 / count as f64;
+            self.progress.update(self.phase, self.share.start + (self.share.end - self.share.start) * fraction)?;
+            let length = batch.min(count - done);
+            parallel::each(length, &|i| work(done + i));
+            done += length;
         }
-        self.progress.update(self.phase, self.share.end)?;
-        Ok(answers)
+        self.progress.update(self.phase, self.share.end)
     }
 
     /// The part of this part that goes from `share.start` to `share.end` of it.

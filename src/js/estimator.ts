@@ -1,4 +1,5 @@
 // An estimator: one worker, and the calls that wait for it.
+import { buffersOf } from './buffers.js';
 import { BilinormalError } from './error.js';
 import { detect } from './features.js';
 import type { Call, Link, Reply, StartWorker } from './protocol.js';
@@ -72,11 +73,7 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
       running.tell('start', 0);
       link ??= start();
       link.hold(true);
-      const { call } = running;
-      link.post(
-        call,
-        Object.values(call).flatMap((value) => (value instanceof Uint8Array ? [value.buffer] : [])),
-      );
+      link.post(running.call, buffersOf(running.call));
     } catch (error) {
       crash(error);
     }
@@ -90,11 +87,11 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
       if (mine !== link) return;
       crash(
         answered
-          ? new BilinormalError('limit', `wasm broke (${reason}), most likely for want of memory: use fewer points`)
+          ? new BilinormalError('limit', `wasm broke, most likely for want of memory (${reason}); use fewer points`)
           : new BilinormalError('unsupported', `the worker did not start: ${reason}`),
       );
     };
-    const name = `bilinormal ${Math.random()}`;
+    const name = `${Math.random()}`;
     channel = new BroadcastChannel(name);
     channel.onmessage = (event) => fail(event.data);
     // Node: a channel alone does not keep the process alive.
@@ -163,12 +160,9 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
     estimateNormals: (positions, options = {}) =>
       run(options, () => {
         const kind = kindOf(positions);
-        want(
-          /^Float(32|64)Array$/.test(kind),
-          'positions',
-          positions,
-          'Float32Array or Float64Array, x y z of each point',
-        );
+        want(/^Float(32|64)Array$/.test(kind), 'positions', positions, 'a Float32Array or Float64Array');
+        const { length } = positions;
+        want(length % 3 === 0, 'the length of positions', length, 'a multiple of 3, x y z of each point');
         const { method, cell, k, orient, curvature, transfer } = options;
         return {
           kind: 'estimate',
@@ -211,7 +205,7 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
     features: async () => detect(),
 
     dispose() {
-      disposed = new BilinormalError('input', 'the estimator was disposed; create another');
+      disposed = new BilinormalError('input', 'the estimator was disposed');
       for (const job of queue.splice(0)) job.reject(disposed);
       crash(disposed);
     },

@@ -15,6 +15,7 @@ export const coded = (code: ErrorCode, message: string) => Object.assign(new Err
 /** Packs what was thrown, without what is undefined. */
 export function failure(error: unknown): Failure {
   const { code, message = String(error), line, byte, needed, available } = error as Partial<Failure>;
-  const known = ['format', 'input', 'limit', 'unsupported'].includes(code!);
-  return known ? JSON.parse(JSON.stringify({ code, message, line, byte, needed, available })) : { message };
+  return /^(format|input|limit|unsupported)$/.test(code!)
+    ? JSON.parse(JSON.stringify({ code, message, line, byte, needed, available }))
+    : { message };
 }

@@ -11,15 +11,14 @@ export function detect(): Features {
   // Node has no such flag, because it needs none.
   const isolated = globalThis.crossOriginIsolated ?? typeof SharedArrayBuffer === 'function';
   let reason: string | undefined;
-  if (!simd) reason = 'this engine has no WebAssembly SIMD';
+  if (!simd) reason = 'no WebAssembly SIMD in this engine';
   else if (!isolated)
-    reason =
-      'the page is not cross-origin isolated; that takes the headers Cross-Origin-Opener-Policy: same-origin and Cross-Origin-Embedder-Policy: require-corp';
+    reason = 'not cross-origin isolated; see the headers Cross-Origin-Opener-Policy and Cross-Origin-Embedder-Policy';
   else {
     try {
       new WebAssembly.Memory({ initial: 1, maximum: 1, shared: true });
     } catch {
-      reason = 'this engine has no shared WebAssembly memory';
+      reason = 'no shared WebAssembly memory in this engine';
     }
   }
   return { threads: !reason, simd, crossOriginIsolated: isolated, ...(reason && { reason }) };

@@ -6,18 +6,14 @@
  * `bilinormal/single.wasm` and `bilinormal/threads.wasm` (the two builds, for `createEstimator({ wasmUrl })`).
  */
 import { makeApi } from './api.js';
-import { isForeign, link, startForeign } from './link.js';
+import { starter } from './link.js';
 
 const api = /* @__PURE__ */ makeApi({
-  startWorker: (receive, fail) =>
-    link(
-      isForeign(import.meta.url)
-        ? startForeign('./worker.js', import.meta.url)
-        : // Bundlers know this form, and this form only.
-          new Worker(new URL('./worker.js', import.meta.url), { type: 'module' }),
-      receive,
-      fail,
-    ),
+  startWorker: starter(
+    './worker.js',
+    import.meta.url,
+    () => new Worker(new URL('./worker.js', import.meta.url), { type: 'module' }),
+  ),
   files: false,
   base: () => globalThis.document?.baseURI ?? location.href,
 });

@@ -3,8 +3,8 @@
 // for a worker that does not load.
 import type { Link, StartWorker, ThreadBoot } from './protocol.js';
 
-/** Longest wait for all threads to answer. Each loads a small script, then a module that is compiled already. */
-const patience = 8000;
+/** Longest wait for all threads to answer, in seconds. Each loads a small script and a module that is compiled. */
+const patience = 8;
 
 interface PoolBuilder {
   numThreads(): number;
@@ -21,7 +21,7 @@ export async function startWorkers(module: WebAssembly.Module, memory: WebAssemb
   const links: Link[] = [];
   const startThread = () =>
     new Promise<void>((resolve, reject) => {
-      const fail = (reason: string) => reject(new Error(`a thread failed: ${reason}`));
+      const fail = (reason: string) => reject(new Error(reason));
       const link = pool.start!((reason?: string) => (reason ? fail(reason) : resolve()), fail);
       links.push(link);
       link.post(boot);
@@ -31,7 +31,7 @@ export async function startWorkers(module: WebAssembly.Module, memory: WebAssemb
     await Promise.race([
       Promise.all(Array.from({ length: builder.numThreads() }, startThread)),
       new Promise((_, reject) => {
-        timer = setTimeout(() => reject(new Error(`a thread gave no answer in ${patience / 1000} s`)), patience);
+        timer = setTimeout(() => reject(new Error(`no answer in ${patience} s`)), patience * 1000);
       }),
     ]);
   } catch (error) {

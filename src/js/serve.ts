@@ -1,4 +1,5 @@
 // The worker's side: takes one call after the other into wasm and hands results out.
+import { buffersOf } from './buffers.js';
 import { coded, failure } from './failure.js';
 import { load, type Loaded, type Platform } from './loader.js';
 import type { Bytes, Call, Reply, Start } from './protocol.js';
@@ -7,11 +8,10 @@ import type { Buffer, Tell } from './wasm.js';
 /** Blobs are read in pieces of this size, so that a file is never whole in JavaScript memory. */
 const pieceBytes = 1 << 23;
 
-type Result = [result: unknown, transfer: Transferable[]];
-
 /** Returns the receiver of messages. */
 export function serve(post: (reply: Reply, transfer: Transferable[]) => void, platform: Platform) {
   let loaded: Promise<Loaded>;
+  let started = false;
   const tell: Tell = (phase, fraction) => post({ phase, fraction }, []);
   return async (message: Start | Call) => {
     if (message.kind === 'start') {
@@ -20,12 +20,11 @@ export function serve(post: (reply: Reply, transfer: Transferable[]) => void, pl
       loaded.catch(() => {});
       return;
     }
-    let started = false;
     try {
       const wasm = await loaded;
       started = true;
-      const [result, transfer] = await answer(message, wasm, platform, tell);
-      post({ result }, transfer);
+      const result = await answer(message, wasm, platform, tell);
+      post({ result }, buffersOf(result));
     } catch (error) {
       const packed = failure(error);
       // After a limit a new worker begins with empty memory; wasm memory never shrinks.
@@ -34,20 +33,20 @@ export function serve(post: (reply: Reply, transfer: Transferable[]) => void, pl
   };
 }
 
-async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Platform, tell: Tell): Promise<Result> {
+async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Platform, tell: Tell): Promise<object> {
   // Made anew for each use: a view of memory that has grown since is empty.
   const view = ({ pointer, byteLength }: Buffer) => new Uint8Array(memory.buffer, pointer, byteLength);
 
-  function put(bytes: Uint8Array): Buffer {
+  function put<T extends Uint8Array | undefined>(bytes: T): Buffer | (T & undefined) {
+    if (!bytes) return bytes as T & undefined;
     const buffer = new glue.Buffer(bytes.byteLength);
     view(buffer).set(bytes);
     return buffer;
   }
-  const putOptional = (bytes?: Uint8Array) => bytes && put(bytes);
 
-  function take(buffer: Buffer): ArrayBuffer {
-    const { buffer: bytes } = view(buffer).slice();
-    buffer.free();
+  function take(buffer?: Buffer): ArrayBuffer | undefined {
+    const bytes = buffer && view(buffer).slice().buffer;
+    buffer?.free();
     return bytes;
   }
 
@@ -85,45 +84,45 @@ async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Plat
 
   switch (call.kind) {
     case 'hello':
-      return [mode, []];
+      return mode;
     case 'estimate': {
       const estimation = glue.estimate(put(call.positions), call.double, call.options, tell);
-      const normals = new Float32Array(take(estimation.takeNormals()));
+      const normals = new Float32Array(take(estimation.takeNormals())!);
       const report = { ...estimation.report, ...mode };
       estimation.free();
-      return [{ normals, report }, [normals.buffer]];
+      return { normals, report };
     }
     case 'read': {
       const cloud = glue.readPly(await putFile(call.file), call.maxPoints, tellRest);
       const { count, origin, format, properties, comments } = cloud;
-      const result = { count, origin: [...origin], source: { format, properties, comments } };
-      const transfer: Transferable[] = [];
-      const add = <T>(name: string, Kind: new (bytes: ArrayBuffer) => T, part?: Buffer) => {
-        if (!part) return;
-        const bytes = take(part);
-        transfer.push(bytes);
-        Object.assign(result, { [name]: new Kind(bytes) });
-      };
-      add('positions', Float32Array, cloud.takePositions());
-      add('normals', Float32Array, cloud.takeNormals());
-      add('colors', Uint8Array, cloud.takeColors());
-      add('intensity', Float32Array, cloud.takeIntensity());
+      const positions = new Float32Array(take(cloud.takePositions())!);
+      const normals = take(cloud.takeNormals());
+      const colors = take(cloud.takeColors());
+      const intensity = take(cloud.takeIntensity());
       cloud.free();
-      return [result, transfer];
+      return {
+        count,
+        positions,
+        origin: [...origin],
+        ...(normals && { normals: new Float32Array(normals) }),
+        ...(colors && { colors: new Uint8Array(colors) }),
+        ...(intensity && { intensity: new Float32Array(intensity) }),
+        source: { format, properties, comments },
+      };
     }
     case 'write': {
       const file = await putFile(call.file);
-      const [normals, curvature] = [putOptional(call.normals), putOptional(call.curvature)];
-      return [takeFile(glue.writePly(file, normals, curvature, call.ascii, tellRest)), []];
+      return takeFile(glue.writePly(file, put(call.normals), put(call.curvature), call.ascii, tellRest));
     }
     case 'writeCloud': {
       const { origin, comments, ascii } = call;
-      const [normals, colors, intensity, curvature] = [call.normals, call.colors, call.intensity, call.curvature].map(
-        putOptional,
+      const [positions, ...parts] = [call.positions, call.normals, call.colors, call.intensity, call.curvature].map(
+        put,
       );
-      const positions = put(call.positions);
-      const file = glue.writeCloud(positions, origin, normals, colors, intensity, curvature, comments, ascii, tell);
-      return [takeFile(file), []];
+      const [normals, colors, intensity, curvature] = parts;
+      return takeFile(
+        glue.writeCloud(positions!, origin, normals, colors, intensity, curvature, comments, ascii, tell),
+      );
     }
   }
 }

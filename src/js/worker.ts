@@ -1,17 +1,14 @@
 // The worker, in a browser.
-import { isForeign, link, startForeign } from './link.js';
+import { starter } from './link.js';
 import { serve } from './serve.js';
 
 const receive = serve((reply, transfer) => postMessage(reply, { transfer }), {
   processors: navigator.hardwareConcurrency,
-  startThread: (receive, fail) =>
-    link(
-      isForeign(import.meta.url)
-        ? startForeign('./thread.js', import.meta.url)
-        : new Worker(new URL('./thread.js', import.meta.url), { type: 'module' }),
-      receive,
-      fail,
-    ),
+  startThread: starter(
+    './thread.js',
+    import.meta.url,
+    () => new Worker(new URL('./thread.js', import.meta.url), { type: 'module' }),
+  ),
   async load(url) {
     const response = await fetch(url);
     if (!response.ok) throw new Error(`HTTP status ${response.status}`);

@@ -45,12 +45,7 @@ fn fixed_end(element: &Element, stride: usize, file: &[u8], start: usize) -> Res
     ))
 }
 
-fn variable_end(
-    element: &Element,
-    file: &[u8],
-    start: usize,
-    big_endian: bool,
-) -> Result<usize, Error> {
+fn variable_end(element: &Element, file: &[u8], start: usize, big_endian: bool) -> Result<usize, Error> {
     let mut at = start;
     // Rows with a list have at least the byte of its length, so the file bounds this loop, whatever the count.
     for row in 0..element.count {
@@ -76,11 +71,7 @@ pub(super) fn visit_row<'a>(
             Kind::List { count, item } => {
                 let word = bits(rest.get(..count.size()).ok_or(Fault::Ends)?, big_endian);
                 let (least, _) = count.range();
-                let length = if least < 0 {
-                    i128::from(count.to_i64(word))
-                } else {
-                    i128::from(word)
-                };
+                let length = if least < 0 { i128::from(count.to_i64(word)) } else { i128::from(word) };
                 let size = count.size() as i128 + length * item.size() as i128;
                 if length < 0 || size > rest.len() as i128 {
                     return Err(Fault::List(length));
@@ -105,9 +96,7 @@ impl Fault {
                     format!("the file ends after {row} of {count} rows of element {name}")
                 }
                 Self::List(length) if length < 0 => {
-                    format!(
-                        "row {row} of element {name} has a list of {length} values; wanted 0 or more"
-                    )
+                    format!("row {row} of element {name} has a list of {length} values; wanted 0 or more")
                 }
                 Self::List(length) => {
                     format!(

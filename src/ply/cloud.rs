@@ -22,30 +22,12 @@ pub fn write_cloud(cloud: &PointCloud, add: &Additions, ascii: bool) -> Result<V
         shifted: cloud.origin != [0.0; 3],
     };
     check(cloud.positions.len(), 3, count, "positions")?;
-    check(
-        cloud.colors.as_ref().map_or(4 * count, Vec::len),
-        4,
-        count,
-        "colors",
-    )?;
-    check(
-        cloud.intensity.as_ref().map_or(count, Vec::len),
-        1,
-        count,
-        "intensity",
-    )?;
-    Additions {
-        normals: rows.normals,
-        curvature: rows.curvature,
-    }
-    .check(count as u64)?;
+    check(cloud.colors.as_ref().map_or(4 * count, Vec::len), 4, count, "colors")?;
+    check(cloud.intensity.as_ref().map_or(count, Vec::len), 1, count, "intensity")?;
+    Additions { normals: rows.normals, curvature: rows.curvature }.check(count as u64)?;
 
     let mut header = Sink::new(Vec::new(), false);
-    let format = if ascii {
-        Format::Ascii
-    } else {
-        Format::BinaryLittleEndian
-    };
+    let format = if ascii { Format::Ascii } else { Format::BinaryLittleEndian };
     header.append(format!("ply\nformat {} 1.0\n", format.name()).as_bytes())?;
     for comment in &cloud.comments {
         header.append(b"comment ")?;
@@ -79,9 +61,7 @@ fn check(length: usize, each: usize, count: usize, name: &str) -> Result<(), Err
     if length == each * count {
         return Ok(());
     }
-    Err(Error::Input(format!(
-        "{name} has {length} values; wanted {each} for each of the {count} points"
-    )))
+    Err(Error::Input(format!("{name} has {length} values; wanted {each} for each of the {count} points")))
 }
 
 struct Rows<'a> {
@@ -93,35 +73,22 @@ struct Rows<'a> {
 
 impl Rows<'_> {
     fn properties(&self) -> Vec<(Scalar, &'static str)> {
-        let position = if self.shifted {
-            Scalar::F64
-        } else {
-            Scalar::F32
-        };
+        let position = if self.shifted { Scalar::F64 } else { Scalar::F32 };
         let groups: [(bool, Scalar, &[&str]); 5] = [
             (true, position, &["x", "y", "z"]),
             (self.normals.is_some(), Scalar::F32, &["nx", "ny", "nz"]),
-            (
-                self.cloud.colors.is_some(),
-                Scalar::U8,
-                &["red", "green", "blue", "alpha"],
-            ),
+            (self.cloud.colors.is_some(), Scalar::U8, &["red", "green", "blue", "alpha"]),
             (self.cloud.intensity.is_some(), Scalar::F32, &["intensity"]),
             (self.curvature.is_some(), Scalar::F32, &["curvature"]),
         ];
         let there = groups.into_iter().filter(|(there, ..)| *there);
-        there
-            .flat_map(|(_, scalar, names)| names.iter().map(move |name| (scalar, *name)))
-            .collect()
+        there.flat_map(|(_, scalar, names)| names.iter().map(move |name| (scalar, *name))).collect()
     }
 
     /// One row, in the order of `properties`. The lengths were checked.
     fn put(&self, point: usize, sink: &mut Sink) -> Result<(), Error> {
         let three = |values: &[f32]| [0, 1, 2].map(|axis| values[3 * point + axis]);
-        for (value, origin) in three(&self.cloud.positions)
-            .into_iter()
-            .zip(self.cloud.origin)
-        {
+        for (value, origin) in three(&self.cloud.positions).into_iter().zip(self.cloud.origin) {
             if self.shifted {
                 sink.value(Scalar::F64, (origin + f64::from(value)).to_bits())?;
             } else {
@@ -129,15 +96,11 @@ impl Rows<'_> {
             }
         }
         if let Some(normals) = self.normals {
-            three(normals)
-                .into_iter()
-                .try_for_each(|value| sink.float(value))?;
+            three(normals).into_iter().try_for_each(|value| sink.float(value))?;
         }
         if let Some(colors) = &self.cloud.colors {
             let channels = &colors[4 * point..4 * point + 4];
-            channels
-                .iter()
-                .try_for_each(|value| sink.value(Scalar::U8, u64::from(*value)))?;
+            channels.iter().try_for_each(|value| sink.value(Scalar::U8, u64::from(*value)))?;
         }
         if let Some(intensity) = &self.cloud.intensity {
             sink.float(intensity[point])?;

@@ -29,24 +29,13 @@ pub(super) enum Target {
 
 const POSITION: [[&str; 3]; 1] = [["x", "y", "z"]];
 /// The names of existing normals; a writer replaces them.
-pub(super) const NORMAL: [[&str; 3]; 2] =
-    [["nx", "ny", "nz"], ["normal_x", "normal_y", "normal_z"]];
+pub(super) const NORMAL: [[&str; 3]; 2] = [["nx", "ny", "nz"], ["normal_x", "normal_y", "normal_z"]];
 const COLOR: [[&str; 4]; 3] = [
     ["red", "green", "blue", "alpha"],
-    [
-        "diffuse_red",
-        "diffuse_green",
-        "diffuse_blue",
-        "diffuse_alpha",
-    ],
+    ["diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"],
     ["r", "g", "b", "a"],
 ];
-const INTENSITY: [[&str; 1]; 4] = [
-    ["intensity"],
-    ["scalar_intensity"],
-    ["reflectance"],
-    ["scalar_reflectance"],
-];
+const INTENSITY: [[&str; 1]; 4] = [["intensity"], ["scalar_intensity"], ["reflectance"], ["scalar_reflectance"]];
 
 /// The properties of `vertex` that are read, positions first; none without all of x y z as plain numbers.
 pub(super) fn find(vertex: &Element) -> Result<Option<Vec<Column>>, Error> {
@@ -56,16 +45,8 @@ pub(super) fn find(vertex: &Element) -> Result<Option<Vec<Column>>, Error> {
     }
     for column in &columns {
         let name = &vertex.properties[column.property].name;
-        if vertex
-            .properties
-            .iter()
-            .filter(|property| property.name == *name)
-            .count()
-            > 1
-        {
-            return Err(Error::format(format!(
-                "property {name} of element vertex is declared twice; wanted one"
-            )));
+        if vertex.properties.iter().filter(|property| property.name == *name).count() > 1 {
+            return Err(Error::format(format!("property {name} of element vertex is declared twice; wanted one")));
         }
     }
     group(vertex, &NORMAL, 3, &mut columns, Target::Normal);
@@ -87,12 +68,7 @@ fn group<const N: usize>(
         if found[..needed].iter().all(Option::is_some) {
             let known = found.into_iter().enumerate();
             columns.extend(known.filter_map(|(component, column)| {
-                column.map(|(property, offset, scalar)| Column {
-                    property,
-                    offset,
-                    scalar,
-                    target: target(component),
-                })
+                column.map(|(property, offset, scalar)| Column { property, offset, scalar, target: target(component) })
             }));
             return true;
         }
@@ -104,29 +80,21 @@ fn group<const N: usize>(
 fn column(vertex: &Element, name: &str) -> Option<(usize, usize, Scalar)> {
     let plain = || {
         let mut offset = 0;
-        vertex
-            .properties
-            .iter()
-            .enumerate()
-            .filter_map(move |(index, property)| {
-                let Kind::Scalar(scalar) = property.kind else {
-                    return None;
-                };
-                offset += scalar.size();
-                Some((&property.name, (index, offset - scalar.size(), scalar)))
-            })
+        vertex.properties.iter().enumerate().filter_map(move |(index, property)| {
+            let Kind::Scalar(scalar) = property.kind else {
+                return None;
+            };
+            offset += scalar.size();
+            Some((&property.name, (index, offset - scalar.size(), scalar)))
+        })
     };
     let exact = plain().find(|(other, _)| *other == name);
-    exact
-        .or_else(|| plain().find(|(other, _)| other.eq_ignore_ascii_case(name)))
-        .map(|(_, found)| found)
+    exact.or_else(|| plain().find(|(other, _)| other.eq_ignore_ascii_case(name))).map(|(_, found)| found)
 }
 
 /// Whether single precision may lose what the coordinates say.
 pub(super) fn is_wide(columns: &[Column]) -> bool {
-    columns
-        .iter()
-        .any(|column| matches!(column.target, Target::Position(_)) && column.scalar.is_wide())
+    columns.iter().any(|column| matches!(column.target, Target::Position(_)) && column.scalar.is_wide())
 }
 
 /// The arrays of a cloud; those without a column stay empty.
@@ -192,11 +160,7 @@ impl Slices<'_> {
     /// Puts one value where it belongs.
     pub fn store(&mut self, point: usize, column: &Column, value: f64, origin: DVec3) {
         let (numbers, index, value) = match column.target {
-            Target::Position(axis) => (
-                &mut *self.positions,
-                3 * point + axis,
-                relative(value, origin[axis]),
-            ),
+            Target::Position(axis) => (&mut *self.positions, 3 * point + axis, relative(value, origin[axis])),
             Target::Normal(axis) => (&mut *self.normals, 3 * point + axis, value as f32),
             Target::Intensity => (&mut *self.intensity, point, value as f32),
             Target::Color(channel) => {
@@ -221,13 +185,7 @@ impl Slices<'_> {
         origin: DVec3,
         big_endian: bool,
     ) {
-        let source = Source {
-            rows,
-            stride,
-            offset: column.offset,
-            first,
-            big_endian,
-        };
+        let source = Source { rows, stride, offset: column.offset, first, big_endian };
         let (numbers, width, component) = match column.target {
             Target::Position(axis) => (&mut *self.positions, 3, axis),
             Target::Normal(axis) => (&mut *self.normals, 3, axis),
@@ -237,26 +195,14 @@ impl Slices<'_> {
             }
             Target::Color(channel) => {
                 let scalar = column.scalar;
-                return source.each_value(self.colors, 4, channel, scalar, |value| {
-                    color(value, scalar)
-                });
+                return source.each_value(self.colors, 4, channel, scalar, |value| color(value, scalar));
             }
         };
-        let origin = if let Target::Position(axis) = column.target {
-            origin[axis]
-        } else {
-            0.0
-        };
+        let origin = if let Target::Position(axis) = column.target { origin[axis] } else { 0.0 };
         match column.scalar {
-            Scalar::F32 if origin == 0.0 => {
-                source.each(numbers, width, component, f32::from_le_bytes)
-            }
-            Scalar::F64 => source.each(numbers, width, component, |b| {
-                relative(f64::from_le_bytes(b), origin)
-            }),
-            scalar => source.each_value(numbers, width, component, scalar, |value| {
-                relative(value, origin)
-            }),
+            Scalar::F32 if origin == 0.0 => source.each(numbers, width, component, f32::from_le_bytes),
+            Scalar::F64 => source.each(numbers, width, component, |b| relative(f64::from_le_bytes(b), origin)),
+            scalar => source.each_value(numbers, width, component, scalar, |value| relative(value, origin)),
         }
     }
 }
@@ -280,11 +226,7 @@ impl Source<'_> {
         convert: impl Fn([u8; N]) -> T,
     ) {
         let places = places.get_mut(width * self.first..).unwrap_or_default();
-        for (row, places) in self
-            .rows
-            .chunks_exact(self.stride)
-            .zip(places.chunks_exact_mut(width))
-        {
+        for (row, places) in self.rows.chunks_exact(self.stride).zip(places.chunks_exact_mut(width)) {
             if let Some(bytes) = row.get(self.offset..).and_then(<[u8]>::first_chunk::<N>) {
                 let mut bytes = *bytes;
                 if self.big_endian {
@@ -306,11 +248,7 @@ impl Source<'_> {
     ) {
         let places = places.get_mut(width * self.first..).unwrap_or_default();
         let bytes = self.offset..self.offset + scalar.size();
-        for (row, places) in self
-            .rows
-            .chunks_exact(self.stride)
-            .zip(places.chunks_exact_mut(width))
-        {
+        for (row, places) in self.rows.chunks_exact(self.stride).zip(places.chunks_exact_mut(width)) {
             if let Some(bytes) = row.get(bytes.clone()) {
                 places[component] = convert(scalar.to_f64(bits(bytes, self.big_endian)));
             }
@@ -322,11 +260,7 @@ impl Source<'_> {
 /// the largest number there is.
 fn relative(value: f64, origin: f64) -> f32 {
     let near = (value - origin) as f32;
-    if near.is_infinite() && value.is_finite() {
-        f32::MAX.copysign(near)
-    } else {
-        near
-    }
+    if near.is_infinite() && value.is_finite() { f32::MAX.copysign(near) } else { near }
 }
 
 /// Floats run from 0 to 1; of 16 bits the upper 8 count; other whole numbers are taken as 0 to 255.

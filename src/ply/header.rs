@@ -7,6 +7,8 @@ use std::borrow::Cow;
 
 /// No honest header comes near; bounds the work on a file that only begins like one.
 const HEADER_BYTES_MAX: usize = 16 << 20;
+/// The same, for work that is done for each element.
+const ELEMENTS_MAX: usize = 4096;
 
 /// A parsed header, with its lines so that a writer can repeat them.
 pub(super) struct Header<'a> {
@@ -58,10 +60,7 @@ pub(super) enum Kind {
 impl Element {
     /// The bytes of every row in a binary file, or none when rows differ because of a list.
     pub fn stride(&self) -> Option<usize> {
-        self.properties
-            .iter()
-            .map(|property| property.kind.fixed_size())
-            .sum()
+        self.properties.iter().map(|property| property.kind.fixed_size()).sum()
     }
 
     /// `vertex 12: float x, float y, list uchar int z`.
@@ -72,9 +71,7 @@ impl Element {
             text.push_str(if index == 0 { " " } else { ", " });
             match property.kind {
                 Kind::Scalar(scalar) => text.push_str(scalar.name()),
-                Kind::List { count, item } => {
-                    text.push_str(&format!("list {} {}", count.name(), item.name()))
-                }
+                Kind::List { count, item } => text.push_str(&format!("list {} {}", count.name(), item.name())),
             }
             text.push(' ');
             text.push_str(&property.name);
@@ -98,27 +95,12 @@ impl Kind {
 impl<'a> Header<'a> {
     /// Reads the header at the beginning of `file`; the body is not looked at.
     pub fn parse(file: &'a [u8]) -> Result<Self, Error> {
-        let start = if file.starts_with(b"\xef\xbb\xbf") {
-            3
-        } else {
-            0
-        };
-        let magic = file
-            .get(start..start + 3)
-            .is_some_and(|word| word.eq_ignore_ascii_case(b"ply"));
-        if !magic
-            || file
-                .get(start + 3)
-                .is_some_and(|byte| !byte.is_ascii_whitespace())
-        {
+        let start = if file.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+        let magic = file.get(start..start + 3).is_some_and(|word| word.eq_ignore_ascii_case(b"ply"));
+        if !magic || file.get(start + 3).is_some_and(|byte| !byte.is_ascii_whitespace()) {
             return Err(Error::format_at(Place::Byte(0), foreign(file)));
         }
-        let mut lines = Lines {
-            file,
-            at: start,
-            number: 0,
-            end: line_end(file, start),
-        };
+        let mut lines = Lines { file, at: start, number: 0, end: line_end(file, start) };
         lines.next();
         let mut format = None;
         let mut header = Self {
@@ -133,21 +115,12 @@ impl<'a> Header<'a> {
             let number = lines.number;
             let wrong = |message: String| Err(Error::format_at(Place::Line(number), message));
             if lines.at - start > HEADER_BYTES_MAX {
-                return wrong(format!(
-                    "the header has no end_header within {} MiB",
-                    HEADER_BYTES_MAX >> 20
-                ));
+                return wrong(format!("the header has no end_header within {} MiB", HEADER_BYTES_MAX >> 20));
             }
-            let keyword = text
-                .split(u8::is_ascii_whitespace)
-                .next()
-                .unwrap_or_default();
+            let keyword = text.split(u8::is_ascii_whitespace).next().unwrap_or_default();
             if matches!(keyword, b"" | b"comment" | b"obj_info") {
                 if !keyword.is_empty() {
-                    header.lines.push(Line {
-                        text,
-                        kind: LineKind::Comment,
-                    });
+                    header.lines.push(Line { text, kind: LineKind::Comment });
                 }
                 continue;
             }
@@ -156,10 +129,7 @@ impl<'a> Header<'a> {
             let kind = match keyword {
                 b"end_header" => {
                     let Some(format) = format else {
-                        return wrong(
-                            "the header has no format line; wanted 'format ascii 1.0' or the like"
-                                .into(),
-                        );
+                        return wrong("the header has no format line; wanted 'format ascii 1.0' or the like".into());
                     };
                     header.format = format;
                     header.body = lines.at;
@@ -176,10 +146,11 @@ impl<'a> Header<'a> {
                 },
                 b"element" => match parse_element(&words) {
                     Ok(element) => {
-                        if element.name == "vertex"
-                            && header.elements.iter().any(|other| other.name == "vertex")
-                        {
+                        if element.name == "vertex" && header.elements.iter().any(|other| other.name == "vertex") {
                             return wrong("a second element named vertex; wanted one".into());
+                        }
+                        if header.elements.len() == ELEMENTS_MAX {
+                            return wrong(format!("more than {ELEMENTS_MAX} elements; wanted that many at most"));
                         }
                         header.elements.push(element);
                         LineKind::Element(header.elements.len() - 1)
@@ -189,10 +160,7 @@ impl<'a> Header<'a> {
                 b"property" => {
                     let owner = header.elements.len().wrapping_sub(1);
                     let Some(element) = header.elements.last_mut() else {
-                        return wrong(
-                            "a property before the first element; wanted an element line above it"
-                                .into(),
-                        );
+                        return wrong("a property before the first element; wanted an element line above it".into());
                     };
                     match parse_property(&words) {
                         Ok(property) => element.properties.push(property),
@@ -209,10 +177,7 @@ impl<'a> Header<'a> {
             };
             header.lines.push(Line { text, kind });
         }
-        Err(Error::format_at(
-            Place::Line(lines.number),
-            "the file ends within the header; end_header is missing",
-        ))
+        Err(Error::format_at(Place::Line(lines.number), "the file ends within the header; end_header is missing"))
     }
 
     pub fn is_big_endian(&self) -> bool {
@@ -224,51 +189,28 @@ impl<'a> Header<'a> {
         self.elements
             .iter()
             .position(|element| element.name == "vertex")
-            .ok_or_else(|| {
-                Error::format(format!(
-                    "the file has no element vertex; it has {}",
-                    self.describe()
-                ))
-            })
+            .ok_or_else(|| Error::format(format!("the file has no element vertex; it has {}", self.describe())))
     }
 
     /// Why there are no points in element `vertex`, which lacks a coordinate.
     pub fn without_position(&self, vertex: &Element) -> Error {
-        if vertex
-            .properties
-            .iter()
-            .any(|property| property.name == "packed_position")
-        {
+        if vertex.properties.iter().any(|property| property.name == "packed_position") {
             return Error::format(
                 "a compressed Gaussian splat file: its positions are packed (packed_position, no x y z), which is not \
                  supported; save it as an uncompressed splat PLY first",
             );
         }
-        Error::format(format!(
-            "the vertices have no x y z as plain numbers; the file has {}",
-            self.describe()
-        ))
+        Error::format(format!("the vertices have no x y z as plain numbers; the file has {}", self.describe()))
     }
 
     /// The texts of all comments and `obj_info` lines.
     pub fn comments(&self) -> Vec<String> {
         let text = |line: &Line| {
             let line = String::from_utf8_lossy(line.text);
-            let keyword = if line.starts_with("comment") {
-                "comment"
-            } else {
-                "obj_info"
-            };
-            line.strip_prefix(keyword)
-                .unwrap_or_default()
-                .trim()
-                .to_owned()
+            let keyword = if line.starts_with("comment") { "comment" } else { "obj_info" };
+            line.strip_prefix(keyword).unwrap_or_default().trim().to_owned()
         };
-        self.lines
-            .iter()
-            .filter(|line| line.kind == LineKind::Comment)
-            .map(text)
-            .collect()
+        self.lines.iter().filter(|line| line.kind == LineKind::Comment).map(text).collect()
     }
 
     fn describe(&self) -> String {
@@ -276,12 +218,7 @@ impl<'a> Header<'a> {
         if self.elements.is_empty() {
             return "no elements at all".into();
         }
-        let mut texts: Vec<String> = self
-            .elements
-            .iter()
-            .take(SHOWN)
-            .map(Element::describe)
-            .collect();
+        let mut texts: Vec<String> = self.elements.iter().take(SHOWN).map(Element::describe).collect();
         if self.elements.len() > SHOWN {
             texts.push(format!("{} more elements", self.elements.len() - SHOWN));
         }
@@ -292,16 +229,10 @@ impl<'a> Header<'a> {
 fn parse_format(words: &[&str]) -> Result<Format, String> {
     const WANTED: &str = "wanted ascii, binary_little_endian or binary_big_endian";
     let [name, version] = words else {
-        return Err(format!(
-            "'format {}'; {WANTED}, and the version 1.0",
-            shorten(words.join(" ").as_bytes())
-        ));
+        return Err(format!("'format {}'; {WANTED}, and the version 1.0", shorten(words.join(" ").as_bytes())));
     };
     if *version != "1.0" {
-        return Err(format!(
-            "version {}; wanted 1.0, the only one there is",
-            shorten(version.as_bytes())
-        ));
+        return Err(format!("version {}; wanted 1.0, the only one there is", shorten(version.as_bytes())));
     }
     match *name {
         "ascii" => Ok(Format::Ascii),
@@ -319,48 +250,29 @@ fn parse_element(words: &[&str]) -> Result<Element, String> {
         ));
     };
     let count = count.parse().map_err(|_| {
-        format!(
-            "{} as the count of element {name}; wanted a whole number from 0",
-            shorten(count.as_bytes())
-        )
+        format!("{} as the count of element {name}; wanted a whole number from 0", shorten(count.as_bytes()))
     })?;
-    Ok(Element {
-        name: (*name).to_owned(),
-        count,
-        properties: Vec::new(),
-    })
+    Ok(Element { name: (*name).to_owned(), count, properties: Vec::new() })
 }
 
 fn parse_property(words: &[&str]) -> Result<Property, String> {
     let scalar = |name: &str| {
-        Scalar::from_name(name)
-            .ok_or_else(|| format!("type {}; wanted one of {NAMES}", shorten(name.as_bytes())))
+        Scalar::from_name(name).ok_or_else(|| format!("type {}; wanted one of {NAMES}", shorten(name.as_bytes())))
     };
     // A name with blanks in it is against the rules, but harmless.
     match words {
         ["list", count, item, _, ..] => {
-            let kind = Kind::List {
-                count: scalar(count)?,
-                item: scalar(item)?,
-            };
+            let kind = Kind::List { count: scalar(count)?, item: scalar(item)? };
             if matches!(kind, Kind::List { count, .. } if !count.is_integer()) {
-                return Err(format!(
-                    "type {count} for the length of a list; wanted a whole-number type"
-                ));
+                return Err(format!("type {count} for the length of a list; wanted a whole-number type"));
             }
-            Ok(Property {
-                name: words[3..].join(" "),
-                kind,
-            })
+            Ok(Property { name: words[3..].join(" "), kind })
         }
         ["list", ..] | [] | [_] => Err(format!(
             "'property {}'; wanted a type and a name, as in 'property float x' or 'property list uchar int vertex_indices'",
             shorten(words.join(" ").as_bytes())
         )),
-        [kind, ..] => Ok(Property {
-            name: words[1..].join(" "),
-            kind: Kind::Scalar(scalar(kind)?),
-        }),
+        [kind, ..] => Ok(Property { name: words[1..].join(" "), kind: Kind::Scalar(scalar(kind)?) }),
     }
 }
 
@@ -377,10 +289,7 @@ impl<'a> Lines<'a> {
         let rest = self.file.get(self.at..).filter(|rest| !rest.is_empty())?;
         // Looking no further than a header can reach keeps this cheap on a large body without line ends.
         let window = &rest[..rest.len().min(HEADER_BYTES_MAX + 1)];
-        let length = window
-            .iter()
-            .position(|byte| *byte == self.end)
-            .unwrap_or(window.len());
+        let length = window.iter().position(|byte| *byte == self.end).unwrap_or(window.len());
         self.at += (length + 1).min(rest.len());
         self.number += 1;
         Some(rest[..length].trim_ascii())
@@ -405,36 +314,18 @@ fn foreign(file: &[u8]) -> String {
         (b"BZh", "a bzip2 file; unpack it first"),
         (b"\xfd7zXZ\0", "an xz file; unpack it first"),
         (b"\x28\xb5\x2f\xfd", "a zstd file; unpack it first"),
-        (
-            b"\xff\xfe",
-            "text in UTF-16; save it as plain ASCII or UTF-8",
-        ),
-        (
-            b"\xfe\xff",
-            "text in UTF-16; save it as plain ASCII or UTF-8",
-        ),
-        (
-            b"p\0l\0y\0",
-            "text in UTF-16; save it as plain ASCII or UTF-8",
-        ),
+        (b"\xff\xfe", "text in UTF-16; save it as plain ASCII or UTF-8"),
+        (b"\xfe\xff", "text in UTF-16; save it as plain ASCII or UTF-8"),
+        (b"p\0l\0y\0", "text in UTF-16; save it as plain ASCII or UTF-8"),
         (b"solid", "an STL file"),
         (b"# .PCD", "a PCD file"),
         (b"LASF", "a LAS or LAZ file"),
         (b"ASTM-E57", "an E57 file"),
         (b"glTF", "a binary glTF file"),
         (b"OFF", "an OFF file"),
-        (
-            b"version https://git-lfs",
-            "a Git LFS pointer, not the file itself; fetch it with git lfs pull",
-        ),
-        (
-            b"<!DOCTYPE",
-            "a web page, not the file itself; the download went wrong",
-        ),
-        (
-            b"<html",
-            "a web page, not the file itself; the download went wrong",
-        ),
+        (b"version https://git-lfs", "a Git LFS pointer, not the file itself; fetch it with git lfs pull"),
+        (b"<!DOCTYPE", "a web page, not the file itself; the download went wrong"),
+        (b"<html", "a web page, not the file itself; the download went wrong"),
     ];
     if file.is_empty() {
         return "the file is empty; wanted a PLY file".into();
@@ -442,20 +333,14 @@ fn foreign(file: &[u8]) -> String {
     if let Some((_, what)) = KNOWN.iter().find(|(magic, _)| file.starts_with(magic)) {
         return format!("not a PLY file but {what}");
     }
-    format!(
-        "not a PLY file: it begins with '{}'; wanted 'ply' as the first line",
-        shorten(file)
-    )
+    format!("not a PLY file: it begins with '{}'; wanted 'ply' as the first line", shorten(file))
 }
 
 /// A few bytes of a file for an error text.
 pub(super) fn shorten(bytes: &[u8]) -> String {
     const SHOWN: usize = 32;
     let text: Cow<str> = String::from_utf8_lossy(&bytes[..bytes.len().min(SHOWN)]);
-    let mut text: String = text
-        .chars()
-        .map(|c| if c.is_control() { '\u{fffd}' } else { c })
-        .collect();
+    let mut text: String = text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
     if bytes.len() > SHOWN {
         text.push('…');
     }

@@ -73,11 +73,7 @@ impl PointCloud {
     /// The positions as the estimator takes them, origin included; nothing is copied.
     pub fn points(&self) -> Points<'_> {
         let whole = &self.positions[..3 * self.len()];
-        Points {
-            positions: Cow::Borrowed(cast_slice(whole)),
-            origin: DVec3::from_array(self.origin),
-            unit: 1.0,
-        }
+        Points { positions: Cow::Borrowed(cast_slice(whole)), origin: DVec3::from_array(self.origin), unit: 1.0 }
     }
 }
 

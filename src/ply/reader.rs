@@ -43,10 +43,7 @@ pub fn read(file: &[u8], options: &ReadOptions, progress: &Progress) -> Result<P
     if let Some(most) = options.max_points
         && vertex.count > most
     {
-        return Err(Error::Input(format!(
-            "the file declares {} points; at most {most} were asked for",
-            vertex.count
-        )));
+        return Err(Error::Input(format!("the file declares {} points; at most {most} were asked for", vertex.count)));
     }
     let (arrays, origin) = match header.format {
         Format::Ascii => read_text(&header, file, index, &columns, progress)?,
@@ -54,20 +51,13 @@ pub fn read(file: &[u8], options: &ReadOptions, progress: &Progress) -> Result<P
             let bytes = binary::extents(&header, file)?.swap_remove(index);
             let big_endian = header.is_big_endian();
             match vertex.stride() {
-                Some(stride) => {
-                    read_fixed(&file[bytes], vertex, stride, big_endian, &columns, progress)?
-                }
+                Some(stride) => read_fixed(&file[bytes], vertex, stride, big_endian, &columns, progress)?,
                 None => read_variable(&file[bytes], vertex, big_endian, &columns, progress)?,
             }
         }
     };
     progress.update("read", 1.0)?;
-    let Arrays {
-        positions,
-        normals,
-        colors,
-        intensity,
-    } = arrays;
+    let Arrays { positions, normals, colors, intensity } = arrays;
     let has = |target| columns.iter().any(|column| column.target == target);
     Ok(PointCloud {
         positions,
@@ -76,11 +66,7 @@ pub fn read(file: &[u8], options: &ReadOptions, progress: &Progress) -> Result<P
         colors: has(columns::Target::Color(0)).then_some(colors),
         intensity: has(columns::Target::Intensity).then_some(intensity),
         format: header.format,
-        properties: vertex
-            .properties
-            .iter()
-            .map(|property| property.name.clone())
-            .collect(),
+        properties: vertex.properties.iter().map(|property| property.name.clone()).collect(),
         comments: header.comments(),
     })
 }
@@ -110,30 +96,16 @@ fn read_fixed(
     let mut arrays = Arrays::new(columns, count)?;
     let tasks = rows.chunks(stride.saturating_mul(TASK));
     let slices = arrays.slices(tasks.clone().map(|rows| rows.len() / stride));
-    let mut meter = Meter {
-        progress,
-        phase: "read",
-        done: 0,
-        total: vertex.count,
-    };
+    let mut meter = Meter { progress, phase: "read", done: 0, total: vertex.count };
     let work = |(rows, mut slices): (&[u8], Slices)| {
         for (block, block_rows) in rows.chunks(stride.saturating_mul(BLOCK)).enumerate() {
             for column in columns {
-                slices.store_column(
-                    block * BLOCK,
-                    block_rows,
-                    stride,
-                    column,
-                    origin,
-                    big_endian,
-                );
+                slices.store_column(block * BLOCK, block_rows, stride, column, origin, big_endian);
             }
         }
         Ok(rows.len() / stride)
     };
-    in_waves(tasks.zip(slices).collect(), work, |points| {
-        meter.add(points)
-    })?;
+    in_waves(tasks.zip(slices).collect(), work, |points| meter.add(points))?;
     Ok((arrays, origin))
 }
 
@@ -148,30 +120,22 @@ fn read_variable(
     let count = vertex.count as usize;
     let columns_of = by_property(vertex, columns);
     // Calls back with each value that is read.
-    let walk =
-        |each: &mut dyn FnMut(usize, &Column, f64) -> Result<(), Error>| -> Result<(), Error> {
-            let mut at = 0;
-            for point in 0..count {
-                let mut outcome = Ok(());
-                at = binary::visit_row(
-                    &vertex.properties,
-                    rows,
-                    at,
-                    big_endian,
-                    |property, bytes| {
-                        if let Some(column) = columns_of[property]
-                            && outcome.is_ok()
-                        {
-                            outcome =
-                                each(point, column, column.scalar.to_f64(bits(bytes, big_endian)));
-                        }
-                    },
-                )
-                .map_err(|fault| fault.error(vertex, point as u64, at))?;
-                outcome?;
-            }
-            Ok(())
-        };
+    let walk = |each: &mut dyn FnMut(usize, &Column, f64) -> Result<(), Error>| -> Result<(), Error> {
+        let mut at = 0;
+        for point in 0..count {
+            let mut outcome = Ok(());
+            at = binary::visit_row(&vertex.properties, rows, at, big_endian, |property, bytes| {
+                if let Some(column) = columns_of[property]
+                    && outcome.is_ok()
+                {
+                    outcome = each(point, column, column.scalar.to_f64(bits(bytes, big_endian)));
+                }
+            })
+            .map_err(|fault| fault.error(vertex, point as u64, at))?;
+            outcome?;
+        }
+        Ok(())
+    };
     let mut origin = DVec3::ZERO;
     if columns::is_wide(columns) {
         let step = count.div_ceil(SAMPLE).max(1);
@@ -215,20 +179,13 @@ fn read_text(
     let mut origin = DVec3::ZERO;
     if columns::is_wide(columns) {
         let step = count.div_ceil(SAMPLE).max(1) as u64;
-        let sample = parallel::map(parts.iter().collect(), |part: &Part| {
-            sample_text(part, step, vertex, &columns_of)
-        });
+        let sample = parallel::map(parts.iter().collect(), |part: &Part| sample_text(part, step, vertex, &columns_of));
         let sample: Vec<DVec3> = sample.into_iter().flatten().collect();
         origin = choose_origin(sample.len(), &|index| sample[index]);
     }
     let mut arrays = Arrays::new(columns, count)?;
     let slices = arrays.slices(parts.iter().map(|part| part.count));
-    let mut meter = Meter {
-        progress,
-        phase: "read",
-        done: 0,
-        total: vertex.count,
-    };
+    let mut meter = Meter { progress, phase: "read", done: 0, total: vertex.count };
     let work = |(part, mut slices): (Part, Slices)| {
         let mut cursor = part.cursor();
         for point in 0..part.count {
@@ -236,9 +193,7 @@ fn read_text(
             for (property, column) in vertex.properties.iter().zip(&columns_of) {
                 match column {
                     Some(column) => {
-                        let value = cursor
-                            .number(column.scalar)
-                            .ok_or_else(|| cursor.complain(vertex))?;
+                        let value = cursor.number(column.scalar).ok_or_else(|| cursor.complain(vertex))?;
                         slices.store(point, column, value, origin);
                     }
                     None => cursor.skip_property(property.kind, vertex)?,
@@ -248,20 +203,13 @@ fn read_text(
         }
         Ok(part.count)
     };
-    in_waves(parts.into_iter().zip(slices).collect(), work, |points| {
-        meter.add(points)
-    })?;
+    in_waves(parts.into_iter().zip(slices).collect(), work, |points| meter.add(points))?;
     Ok((arrays, origin))
 }
 
 /// The positions of every `step`th row of the element. Rows that cannot be read are passed over here; reading them
 /// for good gives the error.
-fn sample_text(
-    part: &Part,
-    step: u64,
-    vertex: &Element,
-    columns_of: &[Option<&Column>],
-) -> Vec<DVec3> {
+fn sample_text(part: &Part, step: u64, vertex: &Element, columns_of: &[Option<&Column>]) -> Vec<DVec3> {
     let mut cursor = part.cursor();
     let mut sample = Vec::new();
     for row in part.first..part.first + part.count as u64 {

@@ -17,8 +17,7 @@ pub(super) enum Scalar {
 }
 
 /// What a header may say, for error texts.
-pub(super) const NAMES: &str =
-    "char, uchar, short, ushort, int, uint, float, double (or int8 ... float64)";
+pub(super) const NAMES: &str = "char, uchar, short, ushort, int, uint, float, double (or int8 ... float64)";
 
 impl Scalar {
     pub fn from_name(name: &str) -> Option<Self> {
@@ -110,9 +109,5 @@ impl Scalar {
 /// The bits of one value of at most 8 bytes, moved to the low end of a word.
 pub(super) fn bits(bytes: &[u8], big_endian: bool) -> u64 {
     let add = |word: u64, byte: &u8| (word << 8) | u64::from(*byte);
-    if big_endian {
-        bytes.iter().fold(0, add)
-    } else {
-        bytes.iter().rev().fold(0, add)
-    }
+    if big_endian { bytes.iter().fold(0, add) } else { bytes.iter().rev().fold(0, add) }
 }

@@ -22,15 +22,23 @@ impl Sink {
     /// Takes memory for so many bytes more; with room to grow further, as a vector does.
     pub fn make_room(&mut self, bytes: usize) -> Result<(), Error> {
         let needed = self.bytes.len() as u64 + bytes as u64;
-        self.bytes
-            .try_reserve(bytes)
-            .map_err(|_| Error::memory("the PLY file", needed))
+        self.bytes.try_reserve(bytes).map_err(|_| Error::memory("the PLY file", needed))
     }
 
     pub fn append(&mut self, bytes: &[u8]) -> Result<(), Error> {
         self.make_room(bytes.len())?;
         self.bytes.extend_from_slice(bytes);
         Ok(())
+    }
+
+    /// A line of the source and its end. In a file whose lines end with `\r` alone, a line may hold a `\n`, which would
+    /// end it here: it becomes a blank.
+    pub fn line(&mut self, text: &[u8]) -> Result<(), Error> {
+        for (part, text) in text.split(|byte| matches!(byte, b'\n' | b'\r')).enumerate() {
+            self.append(if part > 0 { b" " } else { b"" })?;
+            self.append(text)?;
+        }
+        self.append(b"\n")
     }
 
     /// A value by its bits. Floats become the shortest text that reads back as the same value.
@@ -76,30 +84,20 @@ struct Digits {
 }
 
 impl Digits {
-    fn float<F: Into<f64> + Copy + fmt::Display + fmt::LowerExp>(
-        &mut self,
-        value: F,
-    ) -> fmt::Result {
+    fn float<F: Into<f64> + Copy + fmt::Display + fmt::LowerExp>(&mut self, value: F) -> fmt::Result {
         let wide: f64 = value.into();
         if wide.is_nan() {
             // Without the sign, which says nothing.
             return self.write_str("nan");
         }
         let plain = wide == 0.0 || wide.is_infinite() || (1e-5..1e16).contains(&wide.abs());
-        if plain {
-            write!(self, "{value}")
-        } else {
-            write!(self, "{value:e}")
-        }
+        if plain { write!(self, "{value}") } else { write!(self, "{value:e}") }
     }
 }
 
 impl Write for Digits {
     fn write_str(&mut self, text: &str) -> fmt::Result {
-        let place = self
-            .text
-            .get_mut(self.length..self.length + text.len())
-            .ok_or(fmt::Error)?;
+        let place = self.text.get_mut(self.length..self.length + text.len()).ok_or(fmt::Error)?;
         place.copy_from_slice(text.as_bytes());
         self.length += text.len();
         Ok(())

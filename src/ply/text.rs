@@ -42,9 +42,7 @@ impl<'a> Rows<'a> {
         let mut rest = file.get(header.body..).unwrap_or_default();
         while !rest.is_empty() {
             let sure = rest.len().min(PIECE);
-            let more = rest[sure..]
-                .iter()
-                .position(|byte| *byte == header.line_end);
+            let more = rest[sure..].iter().position(|byte| *byte == header.line_end);
             let (piece, after) = rest.split_at(more.map_or(rest.len(), |more| sure + more + 1));
             cuts.push(piece);
             rest = after;
@@ -53,11 +51,7 @@ impl<'a> Rows<'a> {
         let (mut row, mut line) = (0, header.body_line);
         let mut pieces = Vec::with_capacity(cuts.len());
         for (bytes, (rows, lines)) in cuts.into_iter().zip(counts) {
-            pieces.push(Piece {
-                bytes,
-                first_row: row,
-                first_line: line,
-            });
+            pieces.push(Piece { bytes, first_row: row, first_line: line });
             row += rows;
             line += lines;
         }
@@ -65,54 +59,33 @@ impl<'a> Rows<'a> {
         let mut first = 0;
         for element in &header.elements {
             // Rows without values leave no line.
-            let count = if element.properties.is_empty() {
-                0
-            } else {
-                element.count
-            };
+            let count = if element.properties.is_empty() { 0 } else { element.count };
             let there = row - first;
             if there < count {
                 return Err(Error::format_at(
                     Place::Line(line),
-                    format!(
-                        "the file ends after {there} of {count} rows of element {}",
-                        element.name
-                    ),
+                    format!("the file ends after {there} of {count} rows of element {}", element.name),
                 ));
             }
             elements.push(first..first + count);
             first += count;
         }
-        // Rows of too few values are found later, with their line; this only keeps them from costing memory.
-        let values: u128 = header
-            .elements
-            .iter()
-            .map(|e| u128::from(e.count) * e.properties.len() as u128)
-            .sum();
+        // Rows of too few values are found later, with their line; this only keeps them from costing much memory.
+        const FEW: u128 = 1 << 20;
+        let values: u128 = header.elements.iter().map(|e| u128::from(e.count) * e.properties.len() as u128).sum();
         let bytes = file.len() - header.body;
-        if values * 2 > bytes as u128 + 1 {
+        if values > FEW && values * 2 > bytes as u128 + 1 {
             return Err(Error::format_at(
                 Place::Line(header.body_line),
-                format!(
-                    "{bytes} bytes of text cannot hold the {values} values that the header declares"
-                ),
+                format!("{bytes} bytes of text cannot hold the {values} values that the header declares"),
             ));
         }
-        Ok(Self {
-            pieces,
-            line_end: header.line_end,
-            elements,
-        })
+        Ok(Self { pieces, line_end: header.line_end, elements })
     }
 
     /// The rows of one element, cut at the ends of pieces.
     pub fn parts(&self, rows: &Range<u64>) -> Vec<Part<'a>> {
-        let ends = self
-            .pieces
-            .iter()
-            .skip(1)
-            .map(|piece| piece.first_row)
-            .chain([u64::MAX]);
+        let ends = self.pieces.iter().skip(1).map(|piece| piece.first_row).chain([u64::MAX]);
         let overlap = |(piece, end): (&Piece<'a>, u64)| {
             let start = piece.first_row.max(rows.start);
             let count = end.min(rows.end).saturating_sub(start);
@@ -162,13 +135,7 @@ pub(super) struct Cursor<'a> {
 
 impl<'a> Cursor<'a> {
     fn new(bytes: &'a [u8], line_end: u8, line: u64) -> Self {
-        Self {
-            bytes,
-            at: 0,
-            row: 0,
-            line_end,
-            line,
-        }
+        Self { bytes, at: 0, row: 0, line_end, line }
     }
 
     /// Moves to the next line with anything on it; call it at the end of a row.
@@ -188,10 +155,7 @@ impl<'a> Cursor<'a> {
     /// Moves to the end of the row.
     pub fn skip_row(&mut self) {
         let rest = &self.bytes[self.at..];
-        self.at += rest
-            .iter()
-            .position(|byte| *byte == self.line_end)
-            .unwrap_or(rest.len());
+        self.at += rest.iter().position(|byte| *byte == self.line_end).unwrap_or(rest.len());
     }
 
     /// The whole row, without blanks round it; moves to its end.
@@ -204,10 +168,7 @@ impl<'a> Cursor<'a> {
     pub fn token(&mut self) -> Option<&'a [u8]> {
         self.skip_blanks();
         let rest = &self.bytes[self.at..];
-        let length = rest
-            .iter()
-            .position(|byte| *byte <= b' ')
-            .unwrap_or(rest.len());
+        let length = rest.iter().position(|byte| *byte <= b' ').unwrap_or(rest.len());
         self.at += length;
         (length > 0).then(|| &rest[..length])
     }
@@ -218,8 +179,7 @@ impl<'a> Cursor<'a> {
         self.skip_blanks();
         let rest = &self.bytes[self.at..];
         let parsed = if scalar == Scalar::F32 {
-            fast_float2::parse_partial::<f32, _>(rest)
-                .map(|(value, length)| (f64::from(value), length))
+            fast_float2::parse_partial::<f32, _>(rest).map(|(value, length)| (f64::from(value), length))
         } else {
             fast_float2::parse_partial::<f64, _>(rest)
         };
@@ -229,10 +189,7 @@ impl<'a> Cursor<'a> {
             self.at += length;
             return Some(value);
         }
-        let length = rest
-            .iter()
-            .position(|byte| *byte <= b' ')
-            .unwrap_or(rest.len());
+        let length = rest.iter().position(|byte| *byte <= b' ').unwrap_or(rest.len());
         let value = non_finite(&rest[..length])?;
         self.at += length;
         Some(value)
@@ -246,9 +203,7 @@ impl<'a> Cursor<'a> {
             return Ok(value as u64);
         }
         let text = shorten(self.bytes[before..self.at].trim_ascii());
-        Err(self.error(format!(
-            "'{text}' as the length of a list; wanted a whole number from 0"
-        )))
+        Err(self.error(format!("'{text}' as the length of a list; wanted a whole number from 0")))
     }
 
     /// Passes over a property; fails if the row does not hold it.
@@ -266,11 +221,7 @@ impl<'a> Cursor<'a> {
     /// Fails if the row holds more values.
     pub fn end_row(&mut self, element: &Element) -> Result<(), Error> {
         self.skip_blanks();
-        if self.is_at_row_end() {
-            Ok(())
-        } else {
-            Err(self.miscounted(element))
-        }
+        if self.is_at_row_end() { Ok(()) } else { Err(self.miscounted(element)) }
     }
 
     /// Why the value that was wanted here is not to be had: the row ended, or something else is in its place.
@@ -280,11 +231,7 @@ impl<'a> Cursor<'a> {
             return self.miscounted(element);
         };
         let text = shorten(token);
-        let hint = if token.contains(&b',') {
-            "; wanted a decimal point, and blanks between values"
-        } else {
-            ""
-        };
+        let hint = if token.contains(&b',') { "; wanted a decimal point, and blanks between values" } else { "" };
         self.error(format!("'{text}' is not a number{hint}"))
     }
 
@@ -293,23 +240,21 @@ impl<'a> Cursor<'a> {
     }
 
     fn miscounted(&self, element: &Element) -> Error {
-        let mut row = Cursor {
-            at: self.row,
-            ..self.clone()
-        };
+        let mut row = Cursor { at: self.row, ..self.clone() };
         let mut values = 0_u64;
         while row.token().is_some() {
             values += 1;
         }
-        let values = if values == 1 {
-            "1 value".into()
-        } else {
-            format!("{values} values")
-        };
+        // Only the last piece of a body may end without the end of a line.
+        row.skip_row();
+        let cut = if row.at == row.bytes.len() { ", and the file ends here" } else { "" };
+        let values = if values == 1 { "1 value".into() } else { format!("{values} values") };
         let name = &element.name;
         self.error(match element.stride() {
-            Some(_) => format!("{values}, the header declares {} for element {name}", element.properties.len()),
-            None => format!("{values}, which is not what the properties of element {name} and the lengths of its lists ask for"),
+            Some(_) => format!("{values}, the header declares {} for element {name}{cut}", element.properties.len()),
+            None => format!(
+                "{values}, which is not what the properties of element {name} and the lengths of its lists ask for{cut}"
+            ),
         })
     }
 
@@ -323,9 +268,7 @@ impl<'a> Cursor<'a> {
     }
 
     fn is_at_row_end(&self) -> bool {
-        self.bytes
-            .get(self.at)
-            .is_none_or(|byte| *byte == self.line_end)
+        self.bytes.get(self.at).is_none_or(|byte| *byte == self.line_end)
     }
 }
 
@@ -336,14 +279,8 @@ fn non_finite(token: &[u8]) -> Option<f64> {
         [b'+', word @ ..] => (false, word),
         word => (false, word),
     };
-    let begins = |prefix: &[u8]| {
-        word.get(..prefix.len())
-            .is_some_and(|start| start.eq_ignore_ascii_case(prefix))
-    };
-    let value = if begins(b"1.#inf")
-        || word.eq_ignore_ascii_case(b"inf")
-        || word.eq_ignore_ascii_case(b"infinity")
-    {
+    let begins = |prefix: &[u8]| word.get(..prefix.len()).is_some_and(|start| start.eq_ignore_ascii_case(prefix));
+    let value = if begins(b"1.#inf") || word.eq_ignore_ascii_case(b"inf") || word.eq_ignore_ascii_case(b"infinity") {
         f64::INFINITY
     } else if word.eq_ignore_ascii_case(b"nan") || begins(b"nan(") || begins(b"1.#") {
         f64::NAN
@@ -359,21 +296,13 @@ pub(super) fn token_bits(token: &[u8], scalar: Scalar) -> Option<u64> {
     let mut cursor = Cursor::new(token, b'\n', 0);
     if scalar.is_integer() {
         let (least, greatest) = scalar.range();
-        let whole = str::from_utf8(token)
-            .ok()
-            .and_then(|text| text.parse::<i128>().ok())
-            .or_else(|| {
-                let value = cursor.number(Scalar::F64)?;
-                // Beyond this a double no longer names one whole number.
-                (value.fract() == 0.0 && value.abs() <= 9_007_199_254_740_992.0)
-                    .then_some(value as i128)
-            })?;
+        let whole = str::from_utf8(token).ok().and_then(|text| text.parse::<i128>().ok()).or_else(|| {
+            let value = cursor.number(Scalar::F64)?;
+            // Beyond this a double no longer names one whole number.
+            (value.fract() == 0.0 && value.abs() <= 9_007_199_254_740_992.0).then_some(value as i128)
+        })?;
         return (least..=greatest).contains(&whole).then_some(whole as u64);
     }
     let value = cursor.number(scalar)?;
-    Some(if scalar == Scalar::F32 {
-        u64::from((value as f32).to_bits())
-    } else {
-        value.to_bits()
-    })
+    Some(if scalar == Scalar::F32 { u64::from((value as f32).to_bits()) } else { value.to_bits() })
 }

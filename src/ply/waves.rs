@@ -19,9 +19,7 @@ pub(super) fn in_waves<T: Send, R: Send>(
     let mut tasks = tasks.into_iter();
     while tasks.len() > 0 {
         let wave: Vec<T> = tasks.by_ref().take(WAVE).collect();
-        parallel::map(wave, &work)
-            .into_iter()
-            .try_for_each(|result| each(result?))?;
+        parallel::map(wave, &work).into_iter().try_for_each(|result| each(result?))?;
     }
     Ok(())
 }
@@ -37,9 +35,6 @@ pub(super) struct Meter<'a> {
 impl Meter<'_> {
     pub fn add(&mut self, rows: usize) -> Result<(), Error> {
         self.done += rows as u64;
-        self.progress.update(
-            self.phase,
-            (self.done as f64 / self.total.max(1) as f64).min(1.0),
-        )
+        self.progress.update(self.phase, (self.done as f64 / self.total.max(1) as f64).min(1.0))
     }
 }

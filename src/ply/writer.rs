@@ -12,8 +12,8 @@ use crate::progress::Progress;
 
 /// Writes a PLY file again, with normals and curvature in place of those it had.
 ///
-/// - `nx ny nz` (also named `normal_x normal_y normal_z`) and `curvature` are replaced where they stand and become
-///   `float`; new ones follow the other vertex properties.
+/// - `nx ny nz` (also named `normal_x normal_y normal_z`, in any letter case) and `curvature` are replaced where they
+///   stand and become `float`; new ones follow the other vertex properties.
 /// - Every other property, every element, comment and `obj_info` is kept in its order. The output is little-endian, or
 ///   text with `ascii`. Values keep their type and are the same to the bit; text becomes the nearest value of its
 ///   type, and stays as it is from text to text. Floats turned to text read back as the same value.
@@ -23,12 +23,7 @@ use crate::progress::Progress;
 ///
 /// Errors: those of [`read`](super::read) for the file; [`Error::Input`] for additions of another length than the file's;
 /// [`Error::Format`] for text that its declared type cannot hold, when the output is binary.
-pub fn write(
-    file: &[u8],
-    add: &Additions,
-    ascii: bool,
-    progress: &Progress,
-) -> Result<Vec<u8>, Error> {
+pub fn write(file: &[u8], add: &Additions, ascii: bool, progress: &Progress) -> Result<Vec<u8>, Error> {
     progress.update("write", 0.0)?;
     let header = Header::parse(file)?;
     let index = header.vertex()?;
@@ -37,30 +32,18 @@ pub fn write(
     add.check(vertex.count)?;
     let plan = Plan::new(vertex, add);
     let body = Body::locate(&header, file)?;
-    let total = header
-        .elements
-        .iter()
-        .fold(0, |sum: u64, element| sum.saturating_add(element.count));
-    let mut meter = Meter {
-        progress,
-        phase: "write",
-        done: 0,
-        total,
-    };
+    // Without properties there is nothing to write, however many rows there are.
+    let filled = || header.elements.iter().enumerate().filter(|(_, element)| !element.properties.is_empty());
+    let total = filled().map(|(_, element)| element.count).sum();
+    let mut meter = Meter { progress, phase: "write", done: 0, total };
     let mut sink = Sink::new(header_text(&header, index, &plan, ascii)?, ascii);
     if let (Body::Binary(extents), false) = (&body, ascii) {
         // Nothing grows but the vertices, so this is all that is ever needed.
         let body: usize = extents.iter().map(|extent| extent.len()).sum();
-        sink.make_room(
-            body.saturating_add(plan.added_bytes().saturating_mul(vertex.count as usize)),
-        )?;
+        sink.make_room(body.saturating_add(plan.added_bytes().saturating_mul(vertex.count as usize)))?;
     }
-    for (number, element) in header.elements.iter().enumerate() {
-        let element_plan = if number == index {
-            &plan
-        } else {
-            &Plan::copy(element)
-        };
+    for (number, element) in filled() {
+        let element_plan = if number == index { &plan } else { &Plan::copy(element) };
         match &body {
             Body::Binary(extents) => {
                 let rows = &file[extents[number].clone()];
@@ -70,20 +53,15 @@ pub fn write(
                         sink.append(rows)?;
                         meter.add(element.count as usize)?;
                     }
-                    // Without properties there is nothing to write, however many rows there are.
-                    Some(0) => {}
                     Some(stride) if little_to_little => {
                         copy_fixed(rows, stride, vertex, &plan, add, &mut sink, &mut meter)?;
                     }
                     stride => {
-                        let task = stride
-                            .map_or(rows.len(), |stride| stride.saturating_mul(TASK))
-                            .max(1);
+                        let task = stride.map_or(rows.len(), |stride| stride.saturating_mul(TASK)).max(1);
                         let source = |(number, rows)| Source::Binary {
                             rows,
                             first: number * TASK,
-                            count: stride
-                                .map_or(element.count as usize, |stride| rows.len() / stride),
+                            count: stride.map_or(element.count as usize, |stride| rows.len() / stride),
                             big_endian: header.is_big_endian(),
                         };
                         let sources = rows.chunks(task).enumerate().map(source).collect();
@@ -138,34 +116,20 @@ enum Action {
 
 impl Plan {
     fn copy(element: &Element) -> Self {
-        Self {
-            actions: vec![Action::Keep; element.properties.len()],
-            appended: Vec::new(),
-        }
+        Self { actions: vec![Action::Keep; element.properties.len()], appended: Vec::new() }
     }
 
     fn new(vertex: &Element, add: &Additions) -> Self {
         let wanted = |addition: usize| {
-            if addition < 3 {
-                add.normals.is_some()
-            } else {
-                add.curvature.is_some()
-            }
+            if addition < 3 { add.normals.is_some() } else { add.curvature.is_some() }
         };
-        let mut open: Vec<usize> = (0..ADDED.len())
-            .filter(|addition| wanted(*addition))
-            .collect();
+        let mut open: Vec<usize> = (0..ADDED.len()).filter(|addition| wanted(*addition)).collect();
         let action = |name: &str| {
             let replaced = |addition: &usize| {
-                name == ADDED[*addition]
-                    || NORMAL
-                        .iter()
-                        .any(|names| names.get(*addition) == Some(&name))
+                let is = |other: &&str| other.eq_ignore_ascii_case(name);
+                is(&ADDED[*addition]) || NORMAL.iter().any(|names| names.get(*addition).is_some_and(is))
             };
-            match (0..ADDED.len())
-                .filter(|addition| wanted(*addition))
-                .find(replaced)
-            {
+            match (0..ADDED.len()).filter(|addition| wanted(*addition)).find(replaced) {
                 None => Action::Keep,
                 Some(addition) => match open.iter().position(|other| *other == addition) {
                     Some(place) => Action::Replace(open.remove(place)),
@@ -173,25 +137,13 @@ impl Plan {
                 },
             }
         };
-        let actions = vertex
-            .properties
-            .iter()
-            .map(|property| property.name.as_str())
-            .map(action)
-            .collect();
-        Self {
-            actions,
-            appended: open,
-        }
+        let actions = vertex.properties.iter().map(|property| property.name.as_str()).map(action).collect();
+        Self { actions, appended: open }
     }
 
     /// The most that a row can grow by.
     fn added_bytes(&self) -> usize {
-        let replaced = self
-            .actions
-            .iter()
-            .filter(|action| matches!(action, Action::Replace(_)))
-            .count();
+        let replaced = self.actions.iter().filter(|action| matches!(action, Action::Replace(_))).count();
         4 * (self.appended.len() + replaced)
     }
 }
@@ -221,9 +173,7 @@ impl Additions<'_> {
     /// The value of `ADDED[addition]` at a point.
     fn value(&self, addition: usize, point: usize) -> f32 {
         let found = match addition {
-            0..3 => self
-                .normals
-                .and_then(|normals| normals.get(3 * point + addition)),
+            0..3 => self.normals.and_then(|normals| normals.get(3 * point + addition)),
             _ => self.curvature.and_then(|curvature| curvature.get(point)),
         };
         // The lengths were checked.
@@ -245,25 +195,10 @@ fn header_text(header: &Header, vertex: usize, plan: &Plan, ascii: bool) -> Resu
         };
         match action {
             Action::Keep if line.kind == LineKind::Format => {
-                let format = if ascii {
-                    Format::Ascii
-                } else {
-                    Format::BinaryLittleEndian
-                };
+                let format = if ascii { Format::Ascii } else { Format::BinaryLittleEndian };
                 sink.append(format!("format {} 1.0\n", format.name()).as_bytes())?;
             }
-            Action::Keep => {
-                // With lines that end in `\r` alone, a line may hold a `\n`, which would end it here.
-                for (part, text) in line
-                    .text
-                    .split(|byte| matches!(byte, b'\n' | b'\r'))
-                    .enumerate()
-                {
-                    sink.append(if part > 0 { b" " } else { b"" })?;
-                    sink.append(text)?;
-                }
-                sink.append(b"\n")?;
-            }
+            Action::Keep => sink.line(line.text)?,
             Action::Drop => {}
             Action::Replace(addition) => sink.append(property(addition).as_bytes())?,
         }
@@ -298,13 +233,7 @@ fn copy_fixed(
     for (property, action) in vertex.properties.iter().zip(&plan.actions) {
         let size = property.kind.fixed_size().unwrap_or_default();
         match (action, moves.last_mut()) {
-            (
-                Action::Keep,
-                Some(Move::Copy {
-                    from: start,
-                    length,
-                }),
-            ) if *start + *length == from => *length += size,
+            (Action::Keep, Some(Move::Copy { from: start, length })) if *start + *length == from => *length += size,
             (Action::Keep, _) => moves.push(Move::Copy { from, length: size }),
             (Action::Drop, _) => {}
             (Action::Replace(addition), _) => moves.push(Move::Add(*addition)),
@@ -313,35 +242,24 @@ fn copy_fixed(
     }
     moves.extend(plan.appended.iter().map(|addition| Move::Add(*addition)));
     let size = |step: &Move| {
-        if let Move::Copy { length, .. } = step {
-            *length
-        } else {
-            4
-        }
+        if let Move::Copy { length, .. } = step { *length } else { 4 }
     };
     let out_stride: usize = moves.iter().map(size).sum();
 
     let start = sink.bytes.len();
     // Fits: room for it was made before.
-    sink.bytes
-        .resize(start + rows.len() / stride * out_stride, 0);
+    sink.bytes.resize(start + rows.len() / stride * out_stride, 0);
     let sources = rows.chunks(stride.saturating_mul(TASK));
     let targets = sink.bytes[start..].chunks_mut(out_stride.saturating_mul(TASK));
     let work = |(task, (source, target)): (usize, (&[u8], &mut [u8]))| {
-        let pairs = source
-            .chunks_exact(stride)
-            .zip(target.chunks_exact_mut(out_stride));
+        let pairs = source.chunks_exact(stride).zip(target.chunks_exact_mut(out_stride));
         for (row, (source, mut target)) in pairs.enumerate() {
             for step in &moves {
                 let (place, rest) = target.split_at_mut(size(step));
                 match step {
-                    Move::Copy { from, length } => {
-                        place.copy_from_slice(&source[*from..*from + *length])
-                    }
+                    Move::Copy { from, length } => place.copy_from_slice(&source[*from..*from + *length]),
                     Move::Add(addition) => {
-                        place.copy_from_slice(
-                            &add.value(*addition, task * TASK + row).to_le_bytes(),
-                        );
+                        place.copy_from_slice(&add.value(*addition, task * TASK + row).to_le_bytes());
                     }
                 }
                 target = rest;
@@ -349,9 +267,7 @@ fn copy_fixed(
         }
         Ok(source.len() / stride)
     };
-    in_waves(sources.zip(targets).enumerate().collect(), work, |rows| {
-        meter.add(rows)
-    })
+    in_waves(sources.zip(targets).enumerate().collect(), work, |rows| meter.add(rows))
 }
 
 /// Some rows of an element.
@@ -363,7 +279,10 @@ enum Source<'a> {
         big_endian: bool,
     },
     /// With `whole`, rows are copied as they stand, whatever they hold.
-    Text { part: Part<'a>, whole: bool },
+    Text {
+        part: Part<'a>,
+        whole: bool,
+    },
 }
 
 /// Any rows to any format, value by value.
@@ -393,50 +312,26 @@ fn translate(
 
 impl Source<'_> {
     /// Returns the number of rows.
-    fn translate(
-        &self,
-        element: &Element,
-        plan: &Plan,
-        add: &Additions,
-        sink: &mut Sink,
-    ) -> Result<usize, Error> {
+    fn translate(&self, element: &Element, plan: &Plan, add: &Additions, sink: &mut Sink) -> Result<usize, Error> {
         match self {
-            Self::Binary {
-                rows,
-                first,
-                count,
-                big_endian,
-            } => {
+            Self::Binary { rows, first, count, big_endian } => {
                 let mut at = 0;
                 for row in *first..first + count {
                     let mut outcome = Ok(());
-                    at = binary::visit_row(
-                        &element.properties,
-                        rows,
-                        at,
-                        *big_endian,
-                        |index, bytes| {
-                            if outcome.is_ok() {
-                                outcome = match plan.actions[index] {
-                                    Action::Keep => translate_bytes(
-                                        element.properties[index].kind,
-                                        bytes,
-                                        *big_endian,
-                                        sink,
-                                    ),
-                                    Action::Drop => Ok(()),
-                                    Action::Replace(addition) => {
-                                        sink.float(add.value(addition, row))
-                                    }
-                                };
-                            }
-                        },
-                    )
+                    at = binary::visit_row(&element.properties, rows, at, *big_endian, |index, bytes| {
+                        if outcome.is_ok() {
+                            outcome = match plan.actions[index] {
+                                Action::Keep => {
+                                    translate_bytes(element.properties[index].kind, bytes, *big_endian, sink)
+                                }
+                                Action::Drop => Ok(()),
+                                Action::Replace(addition) => sink.float(add.value(addition, row)),
+                            };
+                        }
+                    })
                     .map_err(|fault| fault.error(element, row as u64, at))?;
                     outcome?;
-                    plan.appended
-                        .iter()
-                        .try_for_each(|addition| sink.float(add.value(*addition, row)))?;
+                    plan.appended.iter().try_for_each(|addition| sink.float(add.value(*addition, row)))?;
                     sink.end_row();
                 }
                 Ok(*count)
@@ -446,15 +341,12 @@ impl Source<'_> {
                 for row in part.first as usize..part.first as usize + part.count {
                     cursor.next_row();
                     if *whole {
-                        sink.append(cursor.whole_row())?;
-                        sink.append(b"\n")?;
+                        sink.line(cursor.whole_row())?;
                         continue;
                     }
                     for (property, action) in element.properties.iter().zip(&plan.actions) {
                         match action {
-                            Action::Keep => {
-                                translate_text(&mut cursor, property.kind, element, sink)?
-                            }
+                            Action::Keep => translate_text(&mut cursor, property.kind, element, sink)?,
                             Action::Drop => cursor.skip_property(property.kind, element)?,
                             Action::Replace(addition) => {
                                 cursor.skip_property(property.kind, element)?;
@@ -463,9 +355,7 @@ impl Source<'_> {
                         }
                     }
                     cursor.end_row(element)?;
-                    plan.appended
-                        .iter()
-                        .try_for_each(|addition| sink.float(add.value(*addition, row)))?;
+                    plan.appended.iter().try_for_each(|addition| sink.float(add.value(*addition, row)))?;
                     sink.end_row();
                 }
                 Ok(part.count)
@@ -474,30 +364,18 @@ impl Source<'_> {
     }
 }
 
-fn translate_bytes(
-    kind: Kind,
-    bytes: &[u8],
-    big_endian: bool,
-    sink: &mut Sink,
-) -> Result<(), Error> {
+fn translate_bytes(kind: Kind, bytes: &[u8], big_endian: bool, sink: &mut Sink) -> Result<(), Error> {
     match kind {
         Kind::Scalar(scalar) => sink.value(scalar, bits(bytes, big_endian)),
         Kind::List { count, item } => {
             let (length, items) = bytes.split_at(count.size().min(bytes.len()));
             sink.value(count, bits(length, big_endian))?;
-            items
-                .chunks_exact(item.size())
-                .try_for_each(|bytes| sink.value(item, bits(bytes, big_endian)))
+            items.chunks_exact(item.size()).try_for_each(|bytes| sink.value(item, bits(bytes, big_endian)))
         }
     }
 }
 
-fn translate_text(
-    cursor: &mut Cursor,
-    kind: Kind,
-    element: &Element,
-    sink: &mut Sink,
-) -> Result<(), Error> {
+fn translate_text(cursor: &mut Cursor, kind: Kind, element: &Element, sink: &mut Sink) -> Result<(), Error> {
     let mut next = |cursor: &mut Cursor, scalar: Scalar| {
         let Some(token) = cursor.token() else {
             return Err(cursor.complain(element));

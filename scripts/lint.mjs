@@ -1,0 +1,36 @@
+// npm run lint: formatting and lints of all languages, in every set of features and for both targets.
+
+import { build } from './build.mjs';
+import { checkAll, main, run } from './run.mjs';
+import { setup } from './setup.mjs';
+
+const clippy = (...args) => run('cargo', ['clippy', ...args, '--', '-D', 'warnings']);
+const wasm = ['--target', 'wasm32-unknown-unknown'];
+const checks = {
+  'Rust is formatted': () => run('cargo', ['fmt', '--check']),
+  'clippy, native': () => clippy('--all-targets'),
+  'clippy, native without threads': () => clippy('--all-targets', '--no-default-features'),
+  'clippy, wasm single': () => clippy('--lib', '--test', 'border', '--no-default-features', ...wasm),
+  'clippy, wasm threads': () =>
+    clippy(
+      '--lib',
+      '--features',
+      'threads',
+      '--config',
+      'scripts/threads.toml',
+      '--target-dir',
+      'target/threads',
+      ...wasm,
+    ),
+  'JavaScript, TypeScript and CSS are formatted': () =>
+    run('prettier', ['--check', 'src/js', 'www', 'tests/node', 'tests/browser', 'scripts/*.mjs', '!www/dist']),
+  'types of the package': () => run('tsc', ['--noEmit', '--project', '.']),
+  'types of the page': () => run('tsc', ['--noEmit', '--project', 'www']),
+};
+
+await main(() => {
+  setup();
+  // The page's types are those of the built package.
+  build();
+  checkAll(checks);
+});
