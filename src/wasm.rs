@@ -22,7 +22,7 @@ use crate::progress::Progress;
 use js_sys::{Function, Object, Reflect};
 use std::ops::ControlFlow;
 use wasm_bindgen::prelude::*;
-use web_sys::WorkerGlobalScope;
+use web_sys::Performance;
 
 #[cfg(all(feature = "threads", not(target_feature = "atomics")))]
 compile_error!("feature `threads` needs atomics, in the standard library too: scripts/build.mjs has the flags");
@@ -35,13 +35,18 @@ fn call<T>(tell: &Function, work: impl FnOnce(&Progress) -> Result<T, Error>) ->
         let _ = tell.call2(&JsValue::UNDEFINED, &phase.into(), &fraction.into());
         ControlFlow::Continue(())
     };
-    Ok(work(&Progress::new(&observer, &now))?)
+    Ok(work(&Progress::new(&observer, &milliseconds))?)
 }
 
-/// Milliseconds. Workers of browsers and of Node both have the global `performance`.
-fn now() -> f64 {
-    let scope: WorkerGlobalScope = js_sys::global().unchecked_into();
-    scope.performance().map_or(0.0, |performance| performance.now())
+#[wasm_bindgen]
+extern "C" {
+    /// A global of windows and workers, in browsers and in Node.
+    #[wasm_bindgen(thread_local_v2, js_name = performance)]
+    static PERFORMANCE: Performance;
+}
+
+fn milliseconds() -> f64 {
+    PERFORMANCE.with(Performance::now)
 }
 
 /// Sets a property of an object that this module has just made, which cannot fail.
