@@ -100,7 +100,9 @@ function buildJavaScript() {
   for (const path of filesIn('dist').filter((path) => dirname(path) === 'dist')) rmSync(join(root, path));
   run('tsc', ['--project', '.']);
   // `new URL('./worker.js', import.meta.url)` and the imports of glue stay as they are, for browsers and bundlers.
-  const apart = ['./link.js', './pool.js', './node.js', './single/*', './threads/*'].map((path) => `--external:${path}`);
+  const apart = ['./link.js', './pool.js', './node.js', './single/*', './threads/*'].map(
+    (path) => `--external:${path}`,
+  );
   const scripts = SCRIPTS.map((name) => `src/js/${name}.ts`);
   esbuild([...scripts, '--bundle', '--packages=external', ...apart, '--outdir=dist']);
 }

@@ -15,7 +15,8 @@ export function shortenGlue(folder) {
 
 function shortenCode(glue) {
   const edit = (pattern, replacement) => {
-    if (!pattern.test(glue)) throw new Failure(`the glue of wasm-bindgen has changed: nothing in it matches ${pattern}`);
+    if (!pattern.test(glue))
+      throw new Failure(`the glue of wasm-bindgen has changed: nothing in it matches ${pattern}`);
     glue = glue.replace(pattern, replacement);
   };
   edit(

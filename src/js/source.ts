@@ -16,9 +16,10 @@ export function want(well: unknown, name: string, value: any, wanted: string): a
 export function own(from: ArrayBufferLike | ArrayBufferView, take?: boolean): Uint8Array<ArrayBuffer> {
   const { buffer = from as ArrayBuffer, byteOffset = 0, byteLength } = from as ArrayBufferView;
   try {
+    const bytes = new Uint8Array(buffer, byteOffset, byteLength);
     return take && byteLength === buffer.byteLength && kindOf(buffer) === 'ArrayBuffer'
       ? new Uint8Array(structuredClone(buffer as ArrayBuffer, { transfer: [buffer as ArrayBuffer] }))
-      : new Uint8Array(buffer, byteOffset, byteLength).slice();
+      : bytes.slice();
   } catch (error) {
     // A RangeError: no memory for the copy. Any other: the buffer is detached, or its owner keeps it.
     const { message } = error as Error;

@@ -27,6 +27,7 @@ const shadings: readonly Shading[] = ['shaded', 'normals', 'colors', 'plain'];
 const vertexShader = /* glsl */ `
 uniform float size;
 uniform float pixels;
+uniform float pixelRatio;
 uniform float viewportHeight;
 attribute vec4 color;
 varying vec3 vNormal;
@@ -43,7 +44,7 @@ void main() {
   // In the space of the normals, so that the fragment needs no matrix; zero normals stay zero.
   vToCamera = (isOrthographic ? vec3(0.0, 0.0, 1.0) : -mvPosition.xyz) * normalMatrix;
   gl_Position = projectionMatrix * mvPosition;
-  gl_PointSize = max(size * 0.5 * viewportHeight * projectionMatrix[1][1] / gl_Position.w, pixels);
+  gl_PointSize = max(size * 0.5 * viewportHeight * projectionMatrix[1][1] / gl_Position.w, pixels * pixelRatio);
   #include <logdepthbuf_vertex>
   #include <clipping_planes_vertex>
 }
@@ -92,8 +93,6 @@ void main() {
  * `new BufferAttribute(colors, 4, true)`; missing is white). For `WebGLRenderer`.
  */
 export class PointMaterial extends ShaderMaterial {
-  #pixels: number;
-
   constructor(options: PointMaterialOptions = {}) {
     const { shading = 'shaded', color = '#d8d8d4', size = 0, pixels = 2, round = true, ambient = 0.15 } = options;
     super({
@@ -107,11 +106,11 @@ export class PointMaterial extends ShaderMaterial {
         ambient: { value: ambient },
         size: { value: size },
         pixels: { value: pixels },
+        pixelRatio: { value: 1 },
         isRound: { value: round },
         viewportHeight: { value: 1 },
       },
     });
-    this.#pixels = pixels;
     this.shading = shading;
   }
 
@@ -139,10 +138,10 @@ export class PointMaterial extends ShaderMaterial {
   }
 
   get pixels(): number {
-    return this.#pixels;
+    return this.uniforms.pixels!.value;
   }
   set pixels(pixels: number) {
-    this.#pixels = pixels;
+    this.uniforms.pixels!.value = pixels;
   }
 
   get round(): boolean {
@@ -163,7 +162,7 @@ export class PointMaterial extends ShaderMaterial {
   override onBeforeRender(renderer: WebGLRenderer): void {
     const target = renderer.getRenderTarget();
     this.uniforms.viewportHeight!.value = target ? target.height : renderer.getDrawingBufferSize(drawingBuffer).y;
-    this.uniforms.pixels!.value = this.#pixels * (target ? 1 : renderer.getPixelRatio());
+    this.uniforms.pixelRatio!.value = target ? 1 : renderer.getPixelRatio();
     this.uniformsNeedUpdate = true;
   }
 }

@@ -1,0 +1,205 @@
+// The packed package in a browser, loaded in each way that API.md promises: plain files on the page's own origin, a
+// host on another origin, and a bundle; with and without isolation.
+import assert from 'node:assert/strict';
+import { mkdirSync, symlinkSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { after, before, test } from 'node:test';
+import { chromium } from 'playwright-core';
+import { ISOLATION, serve } from '../../scripts/serve.mjs';
+import { findBrowser } from '../../scripts/setup.mjs';
+import { sphere } from '../node/clouds.mjs';
+import { installPacked, root } from '../node/packed.mjs';
+
+const { project, home } = installPacked();
+const quiet = [
+  '--no-sandbox',
+  '--disable-dev-shm-usage',
+  '--disable-background-networking',
+  '--disable-component-update',
+];
+const anyOrigin = { 'Access-Control-Allow-Origin': '*', 'Cross-Origin-Resource-Policy': 'cross-origin' };
+let browser;
+const servers = [];
+
+async function open(folder, headers) {
+  const server = await serve(folder, { headers });
+  servers.push(server);
+  return server.url;
+}
+
+before(async () => {
+  browser = await chromium.launch({ executablePath: findBrowser(), args: quiet });
+});
+after(async () => {
+  await browser.close();
+  await Promise.all(servers.map((server) => server.close()));
+});
+
+/** Runs the same calls on a page; `script` puts the package into `window.bilinormal`. */
+async function use(address) {
+  const page = await browser.newPage();
+  const errors = [];
+  page.on('pageerror', (error) => errors.push(error.message));
+  page.on('console', (message) => message.type() === 'error' && errors.push(message.text()));
+  await page.goto(address);
+  await page.waitForFunction(() => window.bilinormal, undefined, { timeout: 10000 });
+  const result = await page.evaluate(
+    async (points) => {
+      const { createEstimator, estimateNormals, features, readPointCloud, writePly } = window.bilinormal;
+      const positions = Float32Array.from(points);
+      const told = [];
+      const onProgress = ({ fraction }) => told.push(fraction);
+      const stop = new AbortController();
+      const aborted = estimateNormals(positions, {
+        signal: stop.signal,
+        onProgress: ({ fraction }) => fraction > 0.3 && stop.abort('stop'),
+      }).catch((reason) => reason);
+      const { normals, report } = await estimateNormals(positions, { onProgress });
+      const file = await writePly({ count: points.length / 3, positions, origin: [0, 0, 0] }, { normals });
+      const cloud = await readPointCloud(new File([file], 'sphere.ply'));
+      const two = await createEstimator({ threads: 2, memoryMaxMiB: 256 });
+      const again = await two.estimateNormals(cloud.positions, { transfer: true });
+      two.dispose();
+      const hash = async ({ buffer }) => [...new Uint8Array(await crypto.subtle.digest('SHA-256', buffer))].join();
+      const rising = told[0] === 0 && told.at(-1) === 1 && told.every((fraction, i) => !i || fraction >= told[i - 1]);
+      return {
+        aborted: await aborted,
+        rising,
+        report,
+        asked: again.report.threads,
+        same:
+          (await hash(normals)) === (await hash(again.normals)) &&
+          (await hash(normals)) === (await hash(cloud.normals)),
+        detached: cloud.positions.length === 0,
+        hash: await hash(normals),
+        features: await features(),
+      };
+    },
+    [...sphere(30000)],
+  );
+  await page.close();
+  assert.deepEqual(errors, []);
+  assert.equal(result.aborted, 'stop');
+  assert.ok(result.rising && result.same && result.detached, JSON.stringify(result));
+  return result;
+}
+
+function checkIsolated({ report, features, asked }) {
+  assert.deepEqual(features, { threads: true, simd: true, crossOriginIsolated: true });
+  assert.equal(asked, 2);
+  assert.ok(report.mode === 'threads' || report.fallbackReason === 'there is one processor', report.fallbackReason);
+}
+
+function checkPlain({ report, features, asked }) {
+  assert.equal(features.threads, false);
+  assert.match(features.reason, /not cross-origin isolated/);
+  assert.equal(asked, 1);
+  assert.equal(report.mode, 'single');
+  assert.equal(report.fallbackReason, features.reason);
+}
+
+const html = (from) =>
+  `<!doctype html><link rel="icon" href="data:," /><script type="module">window.bilinormal = await import(${JSON.stringify(from)});</script>`;
+let hash;
+
+test('plain files on the own origin', async () => {
+  writeFileSync(join(project, 'index.html'), html('./node_modules/bilinormal/dist/index.js'));
+  const isolated = await use(await open(project, ISOLATION));
+  checkIsolated(isolated);
+  ({ hash } = isolated);
+  const plain = await use(await open(project, {}));
+  checkPlain(plain);
+  assert.equal(plain.hash, hash, 'both builds give the same bits');
+});
+
+test('files on another origin', async () => {
+  const elsewhere = await open(join(home, 'dist'), anyOrigin);
+  const folder = join(project, 'page');
+  mkdirSync(folder);
+  writeFileSync(join(folder, 'index.html'), html(`${elsewhere}index.js`));
+  const isolated = await use(await open(folder, ISOLATION));
+  checkIsolated(isolated);
+  assert.equal(isolated.hash, hash);
+  checkPlain(await use(await open(folder, {})));
+});
+
+test('a bundle by Vite, with its default settings', async () => {
+  const { build } = await import('vite');
+  const folder = join(project, 'app');
+  mkdirSync(folder);
+  writeFileSync(
+    join(folder, 'index.html'),
+    '<!doctype html><link rel="icon" href="data:," /><script type="module" src="main.js"></script>',
+  );
+  writeFileSync(join(folder, 'main.js'), `import * as bilinormal from 'bilinormal'; window.bilinormal = bilinormal;`);
+  await build({ root: folder, logLevel: 'error' });
+  const isolated = await use(await open(join(folder, 'dist'), ISOLATION));
+  checkIsolated(isolated);
+  assert.equal(isolated.hash, hash);
+  checkPlain(await use(await open(join(folder, 'dist'), {})));
+});
+
+test('the point material shows what it says', async () => {
+  const { build } = await import('vite');
+  const folder = join(project, 'material');
+  mkdirSync(folder);
+  symlinkSync(join(root, 'node_modules', 'three'), join(project, 'node_modules', 'three'), 'junction');
+  writeFileSync(
+    join(folder, 'index.html'),
+    '<!doctype html><link rel="icon" href="data:," /><script type="module" src="main.js"></script>',
+  );
+  writeFileSync(
+    join(folder, 'main.js'),
+    `import * as three from 'three';
+    import { createPointMaterial } from 'bilinormal/three';
+    const renderer = new three.WebGLRenderer();
+    renderer.setSize(64, 64);
+    const camera = new three.PerspectiveCamera(90, 1, 0.1, 10);
+    camera.position.z = 2;
+    window.draw = ({ normal, color, ...options }) => {
+      const geometry = new three.BufferGeometry();
+      geometry.setAttribute('position', new three.BufferAttribute(new Float32Array(3), 3));
+      if (normal) geometry.setAttribute('normal', new three.BufferAttribute(Float32Array.from(normal), 3));
+      if (color) geometry.setAttribute('color', new three.BufferAttribute(Uint8Array.from(color), 4, true));
+      const scene = new three.Scene();
+      scene.add(new three.Points(geometry, createPointMaterial({ color: '#808080', ...options })));
+      renderer.render(scene, camera);
+      const gl = renderer.getContext();
+      const pixels = new Uint8Array(4 * 64 * 64);
+      gl.readPixels(0, 0, 64, 64, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+      const lit = pixels.filter((value, i) => i % 4 < 3).reduce((sum, value) => sum + (value > 0), 0) / 3;
+      return { centre: [...pixels.subarray(4 * (32 * 64 + 32), 4 * (32 * 64 + 32) + 3)], lit };
+    };`,
+  );
+  await build({ root: folder, logLevel: 'error' });
+  const page = await browser.newPage();
+  const errors = [];
+  page.on('console', (message) => message.type() === 'error' && errors.push(message.text()));
+  await page.goto(await open(join(folder, 'dist'), {}));
+  await page.waitForFunction(() => window.draw);
+  const draw = (options) => page.evaluate((options) => window.draw(options), { pixels: 20, ...options });
+  const near = (found, wanted) =>
+    assert.ok(
+      found.every((value, i) => Math.abs(value - wanted[i]) <= 2),
+      `${found}; wanted ${wanted}`,
+    );
+
+  near((await draw({ normal: [0, 0, 1] })).centre, [128, 128, 128]);
+  near((await draw({ normal: [0, 0, -1] })).centre, [128, 128, 128]);
+  const edge = (await draw({ normal: [1, 0, 0] })).centre[0];
+  const unknown = (await draw({})).centre[0];
+  assert.ok(edge > 0 && edge < unknown && unknown < 128, `${edge} ${unknown}`);
+  near((await draw({ normal: [0, 0, 1], shading: 'normals' })).centre, [128, 128, 255]);
+  near((await draw({ normal: [0, -1, 0], shading: 'normals' })).centre, [128, 0, 128]);
+  near((await draw({ color: [200, 100, 50, 255], shading: 'colors' })).centre, [200, 100, 50]);
+  near((await draw({ normal: [1, 0, 0], shading: 'plain' })).centre, [128, 128, 128]);
+
+  // Squares cover more than discs; 1 unit at a distance of 2 is a quarter of the height.
+  const round = (await draw({ shading: 'plain' })).lit;
+  const square = (await draw({ shading: 'plain', round: false })).lit;
+  assert.equal(square, 400);
+  assert.ok(Math.abs(round / square - Math.PI / 4) < 0.05, `${round}`);
+  assert.equal((await draw({ shading: 'plain', round: false, pixels: 1, size: 1 })).lit, 256);
+  assert.deepEqual(errors, []);
+  await page.close();
+});

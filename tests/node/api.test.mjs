@@ -1,0 +1,454 @@
+// What API.md promises, on the packed package in Node.
+import assert from 'node:assert/strict';
+import { writeFileSync } from 'node:fs';
+import { createServer } from 'node:http';
+import { availableParallelism } from 'node:os';
+import { join } from 'node:path';
+import { after, test } from 'node:test';
+import { pathToFileURL } from 'node:url';
+import { deviation, sameBits, sphere } from './clouds.mjs';
+import { installPacked } from './packed.mjs';
+import { parsePly, propertyOf } from './ply.mjs';
+
+const { project, home, load } = installPacked();
+const { BilinormalError, createEstimator, estimateNormals, features, readPointCloud, writePly } =
+  await load('bilinormal');
+
+const bytesOf = async (blob) => Buffer.from(await blob.arrayBuffer());
+const failing = (code, message) => (error) => {
+  assert.ok(error instanceof BilinormalError, `${error}`);
+  assert.equal(error.code, code);
+  assert.match(error.message, message);
+  return true;
+};
+/** Ends with the test that asked for it. */
+async function estimatorFor(context, options) {
+  const estimator = await createEstimator(options);
+  context.after(() => estimator.dispose());
+  return estimator;
+}
+
+test('a sphere: accurate, unit length, and a whole report', async () => {
+  const positions = sphere(187500);
+  const before = positions.slice();
+  const { normals, report, curvature } = await estimateNormals(positions, { cell: { scale: 1 } });
+  assert.ok(sameBits(positions, before), 'the input stays as it was');
+  assert.ok(normals instanceof Float32Array && normals.buffer.constructor === ArrayBuffer);
+  assert.equal(normals.byteLength, normals.buffer.byteLength);
+  assert.equal(normals.length, positions.length);
+  assert.equal(curvature, undefined);
+  for (let at = 0; at < normals.length; at += 3) {
+    assert.ok(Math.abs(Math.hypot(normals[at], normals[at + 1], normals[at + 2]) - 1) < 1e-6);
+  }
+  const { mean, worst } = deviation(positions, normals);
+  assert.ok(mean <= 0.0033 && worst < 2, `mean ${mean}, worst ${worst} degrees`);
+
+  assert.equal(report.points, 187500);
+  assert.equal(report.unresolved, 0);
+  assert.ok(report.cells > 0 && report.nodes > 0 && report.nodes <= report.cells);
+  assert.equal(report.grid.length, 3);
+  assert.ok(Math.abs(report.scale - 1) < 1e-6 && report.cellSize > 0 && report.peakBytes > 12 * 187500);
+  assert.equal(
+    report.nodesUsed.reduce((sum, points) => sum + points),
+    187500,
+  );
+  const { total, ...phases } = report.milliseconds;
+  const sum = Object.values(phases).reduce((sum, time) => sum + time, 0);
+  assert.ok(Object.keys(phases).length > 2 && sum > 0 && sum <= total, `${sum} of ${total} ms`);
+});
+
+test('Node has threads, and says so', async () => {
+  assert.deepEqual(await features(), { threads: true, simd: true, crossOriginIsolated: true });
+  const { report } = await estimateNormals(sphere(1000));
+  const threads = Math.min(availableParallelism(), 16);
+  if (threads === 1) {
+    assert.equal(report.mode, 'single');
+    assert.match(report.fallbackReason, /one processor/);
+  } else {
+    assert.equal(report.mode, 'threads');
+    assert.equal(report.threads, threads);
+    assert.ok(!('fallbackReason' in report));
+  }
+});
+
+test('one thread, two, three and four give the same bits', async (context) => {
+  const positions = sphere(50000);
+  let first;
+  for (const threads of [1, 2, 3, 4]) {
+    const estimator = await estimatorFor(context, { threads });
+    const { normals, report } = await estimator.estimateNormals(positions);
+    assert.equal(report.threads, threads);
+    assert.equal(report.mode, threads === 1 ? 'single' : 'threads');
+    assert.ok(!('fallbackReason' in report));
+    first ??= normals;
+    assert.ok(sameBits(normals, first), `${threads} threads`);
+  }
+});
+
+test('progress rises from 0 to exactly 1, for each kind of call', async () => {
+  const positions = sphere(300000);
+  const told = [];
+  const onProgress = (progress) => told.push(progress);
+  const check = (what) => {
+    assert.ok(told.length > 2, what);
+    assert.equal(told[0].fraction, 0, what);
+    assert.equal(told.at(-1).fraction, 1, what);
+    told.forEach(({ phase, fraction }, i) => {
+      assert.ok(typeof phase === 'string' && phase !== '', what);
+      assert.ok(i === 0 || fraction >= told[i - 1].fraction, `${what}: ${fraction} after ${told[i - 1]?.fraction}`);
+    });
+    told.length = 0;
+  };
+  const { normals } = await estimateNormals(positions, { onProgress });
+  check('estimateNormals');
+  const ply = await writePly({ count: 300000, positions, origin: [0, 0, 0] }, { normals }, { onProgress });
+  check('writePly of a cloud');
+  await readPointCloud(ply, { onProgress });
+  check('readPointCloud');
+  await writePly(ply, { normals }, { onProgress });
+  check('writePly of a file');
+});
+
+test('what onProgress throws rejects the call, and the next one works', async () => {
+  const oops = new Error('oops');
+  const onProgress = ({ fraction }) => {
+    if (fraction > 0) throw oops;
+  };
+  await assert.rejects(estimateNormals(sphere(20000), { onProgress }), oops);
+  await estimateNormals(sphere(100));
+});
+
+test('abort: before the call, in the queue, and while wasm runs; the estimator stays usable', async (context) => {
+  const estimator = await estimatorFor(context, { threads: 2 });
+  const positions = sphere(200000);
+  const reason = new Error('changed my mind');
+  const kept = new Float32Array(3);
+  await assert.rejects(estimator.estimateNormals(kept, { signal: AbortSignal.abort(reason), transfer: true }), reason);
+  assert.equal(kept.length, 3, 'nothing was taken');
+
+  const running = new AbortController();
+  const waiting = new AbortController();
+  let seen = 0;
+  const calls = [
+    estimator.estimateNormals(positions, {
+      signal: running.signal,
+      onProgress({ fraction }) {
+        seen = fraction;
+        if (fraction > 0.2) running.abort(reason);
+      },
+    }),
+    estimator.estimateNormals(positions, { signal: waiting.signal }),
+    estimator.estimateNormals(positions),
+  ];
+  waiting.abort('not needed');
+  const [first, second, third] = await Promise.allSettled(calls);
+  assert.equal(first.reason, reason);
+  assert.ok(seen > 0 && seen < 1);
+  assert.equal(second.reason, 'not needed');
+  assert.equal(third.status, 'fulfilled');
+  assert.equal(third.value.report.points, 200000);
+  // Too late to matter.
+  running.abort();
+  assert.equal((await estimator.estimateNormals(sphere(10))).normals.length, 30);
+});
+
+test('concurrent calls queue, and each gets its own result and progress', async () => {
+  const counts = [50000, 10, 3000, 0, 20000];
+  const last = counts.map(() => 0);
+  const results = await Promise.all(
+    counts.map((count, i) => estimateNormals(sphere(count), { onProgress: ({ fraction }) => (last[i] = fraction) })),
+  );
+  assert.deepEqual(
+    results.map(({ normals }) => normals.length / 3),
+    counts,
+  );
+  assert.deepEqual(
+    last,
+    counts.map(() => 1),
+  );
+});
+
+test('transfer takes the buffer; views of parts and shared memory are copied', async () => {
+  const expected = (await estimateNormals(sphere(5000))).normals;
+
+  const given = sphere(5000);
+  const promise = estimateNormals(given, { transfer: true });
+  assert.equal(given.length, 0, 'detached at once');
+  assert.ok(sameBits((await promise).normals, expected));
+  await assert.rejects(estimateNormals(given, { transfer: true }), failing('input', /buffer cannot be taken/));
+  await assert.rejects(estimateNormals(given), failing('input', /buffer cannot be taken/));
+
+  const large = new Float32Array(15000 + 7);
+  large.set(sphere(5000), 3);
+  const view = large.subarray(3, 15003);
+  assert.ok(sameBits((await estimateNormals(view, { transfer: true })).normals, expected));
+  assert.equal(large.length, 15007);
+
+  const shared = new Float32Array(new SharedArrayBuffer(4 * 15000));
+  shared.set(sphere(5000));
+  for (const transfer of [false, true]) {
+    const { normals } = await estimateNormals(shared, { transfer });
+    assert.ok(sameBits(normals, expected));
+    assert.equal(normals.buffer.constructor, ArrayBuffer);
+  }
+});
+
+test('positions are read when the call is made', async () => {
+  const positions = sphere(5000);
+  const expected = (await estimateNormals(positions)).normals;
+  const first = estimateNormals(sphere(100000));
+  const second = estimateNormals(positions);
+  positions.fill(0);
+  await first;
+  assert.ok(sameBits((await second).normals, expected));
+});
+
+test('doubles far from zero give what floats near zero give', async () => {
+  const near = sphere(20000, Float64Array);
+  const far = near.map((value, i) => value + [3.5e6, -5.1e6, 250][i % 3]);
+  const { normals } = await estimateNormals(far, { cell: { scale: 1 } });
+  assert.ok(deviation(near, normals).worst < 6);
+});
+
+test('points that are not finite get the zero vector', async () => {
+  const positions = sphere(5000);
+  positions[4] = NaN;
+  positions[9] = Infinity;
+  const { normals, report } = await estimateNormals(positions);
+  assert.equal(report.unresolved, 2);
+  assert.deepEqual([...normals.subarray(3, 6), ...normals.subarray(9, 12)], [0, 0, 0, 0, 0, 0]);
+});
+
+test('no points, no normals', async () => {
+  const { normals, report } = await estimateNormals(new Float32Array(0));
+  assert.equal(normals.length, 0);
+  assert.equal(report.points, 0);
+});
+
+test('wrong arguments are input errors that say what came and what was wanted', async (context) => {
+  const positions = sphere(10);
+  const cases = [
+    [() => estimateNormals([1, 2, 3]), /positions is Array\(3\); wanted a Float32Array or Float64Array/],
+    [() => estimateNormals(undefined), /positions is undefined; wanted/],
+    [() => estimateNormals(new Uint8Array(6)), /positions is Uint8Array\(6\); wanted/],
+    [() => estimateNormals(new Float32Array(4)), /4; wanted a multiple of 3/],
+    [() => estimateNormals(positions, { cell: { scale: 1000 } }), /1000; wanted .*0\.1 to 100/],
+    [() => estimateNormals(positions, { cell: { size: NaN } }), /NaN/],
+    [() => estimateNormals(positions, { method: 'magic' }), /magic.*wanted/],
+    [() => readPointCloud('scan.ply'), /source is scan\.ply; wanted a File, Blob/],
+    [() => readPointCloud({}), /source is Object\(\); wanted/],
+    [() => readPointCloud(new Blob(), { maxPoints: -1 }), /-1; wanted/],
+    [() => readPointCloud(pathToFileURL(join(project, 'missing.ply'))), /could not be read.*ENOENT/],
+    [() => readPointCloud(new URL('http://127.0.0.1:1/scan.ply')), /127\.0\.0\.1:1\/scan\.ply did not load/],
+    [() => writePly(undefined, {}), /source is undefined; wanted/],
+    [() => writePly({ count: 10, positions }, { normals: [0, 0, 1] }), /normals is Array\(3\); wanted a Float32Array/],
+    [() => writePly({ count: 10, positions }, { normals: new Float32Array(3) }), /normals.*wanted/],
+    [() => writePly({ count: 10, positions, colors: new Uint8Array(3) }, {}), /colors.*wanted/],
+    [() => writePly({ count: 10, positions }, {}, { format: 'obj' }), /format is obj; wanted/],
+    [() => createEstimator({ threads: 0 }), /threads is 0; wanted 'auto' or 1 to 256/],
+    [() => createEstimator({ memoryMaxMiB: 5000 }), /memoryMaxMiB is 5000; wanted 16 to 4096/],
+  ];
+  for (const [call, message] of cases) await assert.rejects(call, failing('input', message), `${call}`);
+  await assert.rejects(
+    createEstimator({ wasmUrl: join(project, 'nowhere') }),
+    failing('unsupported', /nowhere\/single\.wasm did not load.*ENOENT/),
+  );
+  const estimator = await estimatorFor(context);
+  await assert.rejects(estimator.estimateNormals([]), failing('input', /Array\(0\)/));
+});
+
+test('a file with an error says where', async () => {
+  const header =
+    'ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n';
+  await assert.rejects(readPointCloud(new Blob([header, '1 2 3\n4 5 six\n'])), (error) => {
+    failing('format', /line 9/)(error);
+    return error.line === 9 && !('byte' in error);
+  });
+  const binary = Buffer.from(header.replace('ascii', 'binary_little_endian'));
+  await assert.rejects(readPointCloud(Buffer.concat([binary, Buffer.alloc(13)])), (error) => {
+    failing('format', /./)(error);
+    return Number.isInteger(error.byte);
+  });
+  await assert.rejects(readPointCloud(new Blob(['solid teapot'])), failing('format', /./));
+  await assert.rejects(readPointCloud(new Blob([])), failing('format', /./));
+});
+
+test('too little memory is a limit error with numbers, and the estimator stays usable', async (context) => {
+  for (const threads of [1, 2]) {
+    const estimator = await estimatorFor(context, { threads, memoryMaxMiB: 16 });
+    await assert.rejects(estimator.estimateNormals(new Float32Array(3e6 * 3)), (error) => {
+      failing('limit', /memory/)(error);
+      return error.needed >= 36e6;
+    });
+    const { report } = await estimator.estimateNormals(sphere(1000));
+    assert.equal(report.points, 1000);
+    assert.equal(report.threads, threads);
+  }
+});
+
+test('dispose ends pending calls and later ones, and nothing else', async () => {
+  const estimator = await createEstimator();
+  const pending = [estimator.estimateNormals(sphere(200000)), estimator.readPointCloud(new Blob(['ply\n']))];
+  const shared = estimateNormals(sphere(100));
+  await new Promise((resolve) => setTimeout(resolve, 20));
+  estimator.dispose();
+  for (const call of pending) await assert.rejects(call, failing('input', /disposed/));
+  await assert.rejects(estimator.estimateNormals(sphere(10)), failing('input', /disposed/));
+  estimator.dispose();
+  assert.equal((await shared).normals.length, 300);
+});
+
+const typed = `ply
+format ascii 1.0
+comment made by hand
+element camera 1
+property float focal
+element vertex 4
+property double z
+property uchar red
+property float nx
+property list uchar int neighbours
+property float x
+property float ny
+property float nz
+property float y
+property uchar green
+property uchar blue
+property float intensity
+element face 1
+property list uchar int vertex_indices
+end_header
+35.5
+0.25 255 0 2 1 2 1 0 1 10 0 128 0.5
+0.5 254 0 0 2 0 1 20 1 127 1.5
+0.75 253 0 1 3 3 0 1 30 2 126 2.5
+1.25 252 0 3 0 1 2 4 0 1 40 3 125 3.5
+4 0 1 2 3
+`;
+
+test('every kind of source gives the same cloud', async () => {
+  const bytes = Buffer.from(typed);
+  const path = join(project, 'typed.ply');
+  writeFileSync(path, bytes);
+  const server = createServer((request, response) => {
+    if (request.url === '/missing.ply') response.statusCode = 404;
+    else response.setHeader('content-length', bytes.length);
+    response.end(bytes);
+  });
+  await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
+  after(() => server.close());
+  const url = new URL(`http://127.0.0.1:${server.address().port}/typed.ply`);
+  const shared = new Uint8Array(new SharedArrayBuffer(bytes.length));
+  shared.set(bytes);
+  const sources = {
+    Blob: new Blob([bytes]),
+    File: new (globalThis.File ?? Blob)([bytes], 'typed.ply'),
+    ArrayBuffer: bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length),
+    'a part of a buffer': bytes,
+    'shared memory': shared,
+    'file URL': pathToFileURL(path),
+    'http URL': url,
+    Response: await fetch(url),
+  };
+  const read = await fetch(url);
+  await read.text();
+  for (const [name, source] of Object.entries(sources)) {
+    const cloud = await readPointCloud(source);
+    assert.equal(cloud.count, 4, name);
+    assert.deepEqual([...cloud.positions], [1, 10, 0.25, 2, 20, 0.5, 3, 30, 0.75, 4, 40, 1.25], name);
+    assert.deepEqual(cloud.origin, [0, 0, 0], name);
+    assert.deepEqual([...cloud.normals], [0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1], name);
+    assert.deepEqual([...cloud.colors.subarray(0, 8)], [255, 0, 128, 255, 254, 1, 127, 255], name);
+    assert.deepEqual([...cloud.intensity], [0.5, 1.5, 2.5, 3.5], name);
+    assert.equal(cloud.source.format, 'ascii', name);
+    assert.ok(cloud.source.properties.includes('neighbours') && cloud.source.comments.includes('made by hand'), name);
+  }
+  assert.equal(bytes.length, typed.length, 'no source is taken');
+  const missing = new URL('missing.ply', url);
+  await assert.rejects(readPointCloud(missing), failing('input', /missing\.ply has HTTP status 404/));
+  await assert.rejects(readPointCloud(read), failing('input', /was read before/));
+});
+
+test('a download tells its progress, and can be aborted', async () => {
+  const stop = new AbortController();
+  const server = createServer((_, response) => {
+    response.setHeader('content-length', 1000000);
+    response.write(Buffer.alloc(500000));
+  });
+  await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
+  after(() => server.closeAllConnections?.() ?? server.close());
+  after(() => server.close());
+  const told = [];
+  const call = readPointCloud(new URL(`http://127.0.0.1:${server.address().port}/`), {
+    signal: stop.signal,
+    onProgress(progress) {
+      told.push(progress);
+      if (progress.fraction === 0.25) stop.abort('enough');
+    },
+  });
+  await assert.rejects(call, (reason) => reason === 'enough');
+  assert.deepEqual(told[0], { phase: 'download', fraction: 0 });
+});
+
+test('maxPoints refuses a larger file', async () => {
+  assert.equal((await readPointCloud(new Blob([typed]), { maxPoints: 4 })).count, 4);
+  await assert.rejects(
+    readPointCloud(new Blob([typed]), { maxPoints: 3 }),
+    (error) => error instanceof BilinormalError,
+  );
+});
+
+test('writePly keeps every property of a file, in both formats', async () => {
+  const normals = Float32Array.from({ length: 12 }, (_, i) => Math.fround(i / 7));
+  const before = parsePly(Buffer.from(typed));
+  for (const format of ['binary_little_endian', 'ascii']) {
+    for (const source of [new Blob([typed]), Buffer.from(typed)]) {
+      const blob = await writePly(source, { normals }, { format });
+      const parsed = parsePly(await bytesOf(blob));
+      assert.equal(parsed.format, format);
+      for (const { name, properties } of before.elements) {
+        for (const property of properties) {
+          const written = propertyOf(parsed, name, property.name);
+          const axis = ['nx', 'ny', 'nz'].indexOf(property.name);
+          const values = axis < 0 ? property.values : [...normals].filter((_, i) => i % 3 === axis);
+          assert.deepEqual(written.values, values, `${format} ${name} ${property.name}`);
+          assert.equal(written.type, property.type);
+        }
+      }
+      assert.deepEqual(
+        parsed.elements.map(({ name }) => name),
+        ['camera', 'vertex', 'face'],
+      );
+      assert.ok(parsed.remarks.includes('comment made by hand'));
+    }
+  }
+  const wrong = writePly(new Blob([typed]), { normals: new Float32Array(9) });
+  await assert.rejects(wrong, failing('input', /normals.*wanted/));
+});
+
+test('a cloud written and read again is the same cloud', async () => {
+  const cloud = await readPointCloud(new Blob([typed]));
+  cloud.origin = [1000, 2000, 3000.5];
+  const blob = await writePly(cloud, {});
+  assert.ok(blob instanceof Blob);
+  const again = await readPointCloud(blob);
+  const absolute = ({ positions, origin }) => [...positions].map((value, i) => value + origin[i % 3]);
+  assert.deepEqual(absolute(again), absolute(cloud));
+  for (const part of ['normals', 'colors', 'intensity']) assert.deepEqual(again[part], cloud[part], part);
+});
+
+test('an estimator finds wasm files that are hosted elsewhere', async (context) => {
+  const folder = join(project, 'hosted');
+  const { copyFileSync, mkdirSync } = await import('node:fs');
+  mkdirSync(folder);
+  for (const build of ['single', 'threads']) {
+    copyFileSync(join(home, 'dist', build, 'bilinormal_bg.wasm'), join(folder, `${build}.wasm`));
+  }
+  for (const threads of [1, 2]) {
+    for (const wasmUrl of [pathToFileURL(folder), `${pathToFileURL(folder)}/`]) {
+      const estimator = await estimatorFor(context, { threads, wasmUrl });
+      const { report } = await estimator.estimateNormals(sphere(100));
+      assert.equal(report.threads, threads);
+    }
+  }
+});

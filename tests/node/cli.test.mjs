@@ -1,0 +1,172 @@
+// The command line of the packed package.
+import assert from 'node:assert/strict';
+import { spawn, spawnSync } from 'node:child_process';
+import { mkdirSync, readFileSync, readdirSync, statSync, symlinkSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { test } from 'node:test';
+import { deviation, sphere } from './clouds.mjs';
+import { installPacked } from './packed.mjs';
+import { parsePly, propertyOf, withoutNormals } from './ply.mjs';
+
+const { project, cli } = installPacked();
+const folder = join(project, 'files');
+mkdirSync(folder);
+
+function run(args, options = {}) {
+  const { status, stdout, stderr } = spawnSync(process.execPath, [cli, ...args], {
+    cwd: folder,
+    encoding: 'utf8',
+    timeout: 60000,
+    ...options,
+  });
+  return { status, stdout, stderr };
+}
+
+const header = (count, format = 'binary_little_endian') =>
+  `ply\nformat ${format} 1.0\ncomment a sphere\nelement vertex ${count}\nproperty float x\nproperty float y\nproperty float z\nend_header\n`;
+const positions = sphere(20000);
+const ply = Buffer.concat([Buffer.from(header(20000)), Buffer.from(positions.buffer)]);
+writeFileSync(join(folder, 'sphere.ply'), ply);
+
+const written = (name) => parsePly(readFileSync(join(folder, name)));
+function normalsOf(parsed) {
+  const [x, y, z] = ['nx', 'ny', 'nz'].map((name) => propertyOf(parsed, 'vertex', name).values);
+  return Float64Array.from({ length: 3 * x.length }, (_, i) => [x, y, z][i % 3][Math.floor(i / 3)]);
+}
+const leftovers = () => readdirSync(folder).filter((name) => name.startsWith('.'));
+
+test('a file gains normals, and a report of one screen is printed', () => {
+  const { status, stdout, stderr } = run(['sphere.ply', '-o', 'out.ply', '--cell-scale', '1.0']);
+  assert.deepEqual({ status, stderr }, { status: 0, stderr: '' });
+  assert.match(stdout, /points +20,000\n/);
+  assert.ok(stdout.split('\n').length < 24);
+  const parsed = written('out.ply');
+  assert.equal(parsed.format, 'binary_little_endian');
+  assert.deepEqual(withoutNormals(parsed), withoutNormals(parsePly(ply)));
+  assert.ok(deviation(positions, normalsOf(parsed)).worst < 3);
+  assert.deepEqual(leftovers(), []);
+});
+
+test('--json prints the report as one line, --quiet nothing', () => {
+  const { stdout } = run([
+    'sphere.ply',
+    '--out=json.ply',
+    '--json',
+    '--threads',
+    '1',
+    '--cell-size',
+    '0.05',
+    '--ascii',
+  ]);
+  assert.match(stdout, /^\{.*\}\n$/);
+  const report = JSON.parse(stdout);
+  assert.equal(report.points, 20000);
+  assert.equal(report.mode, 'single');
+  assert.ok(Math.abs(report.cellSize - 0.05) < 1e-6 && report.milliseconds.total > 0);
+  assert.equal(written('json.ply').format, 'ascii');
+  const quiet = run(['sphere.ply', '-o', 'quiet.ply', '--quiet']);
+  assert.deepEqual(quiet, { status: 0, stdout: '', stderr: '' });
+});
+
+test('input and output may be the same file; links and permissions stay', () => {
+  const path = join(folder, 'same.ply');
+  writeFileSync(path, ply, { mode: 0o640 });
+  assert.equal(run(['same.ply', '-o', 'same.ply', '--quiet']).status, 0);
+  assert.equal(statSync(path).mode & 0o777, 0o640);
+  const once = readFileSync(path);
+  if (process.platform !== 'win32') {
+    symlinkSync('same.ply', join(folder, 'link.ply'));
+    assert.equal(run(['link.ply', '-o', 'link.ply', '--quiet']).status, 0);
+  }
+  assert.ok(readFileSync(path).equals(once), 'normals are replaced, not added');
+  assert.equal(propertyOf(written('link.ply'), 'vertex', 'nx').values.length, 20000);
+});
+
+test('standard input and devices', { skip: process.platform === 'win32' }, () => {
+  assert.equal(run(['-', '-o', 'piped.ply', '--quiet'], { input: ply }).status, 0);
+  assert.equal(propertyOf(written('piped.ply'), 'vertex', 'nx').values.length, 20000);
+  assert.equal(run(['sphere.ply', '-o', '/dev/null', '--quiet']).status, 0);
+  assert.ok(statSync('/dev/null').isCharacterDevice());
+});
+
+test('--help prints the usage', () => {
+  const { status, stdout, stderr } = run(['--help']);
+  assert.deepEqual({ status, stderr }, { status: 0, stderr: '' });
+  for (const option of ['--method', '--cell-scale', '--orient', '--threads', '--json'])
+    assert.ok(stdout.includes(option));
+});
+
+test('wrong usage ends with 2, one line and a hint', () => {
+  const cases = [
+    [[], /no input file/],
+    [['a.ply'], /no output file/],
+    [['a.ply', 'b.ply', '-o', 'c.ply'], /b\.ply/],
+    [['a.ply', '-o', 'b.ply', '--magic'], /--magic/],
+    [['a.ply', '-o', 'b.ply', '--method', 'magic'], /--method is magic; wanted bilinear, knn, egg/],
+    [['a.ply', '-o', 'b.ply', '--cell-scale', 'big'], /--cell-scale is big; wanted a number/],
+    [['a.ply', '-o', 'b.ply', '--cell-scale', '1', '--cell-size', '1'], /exclude/],
+    [['a.ply', '-o', 'b.ply', '--cell', 'huge'], /--cell is huge; wanted auto/],
+    [['a.ply', '-o', 'b.ply', '--threads', '0'], /--threads is 0; wanted a whole number/],
+    [['a.ply', '-o', 'b.ply', '--orient', 'up=1,2'], /three numbers/],
+    [['a.ply', '-o', 'b.ply', '--orient', 'down=1,2,3'], /down/],
+    [['a.ply', '-o', '-'], /standard output/],
+  ];
+  for (const [args, message] of cases) {
+    const { status, stdout, stderr } = run(args);
+    assert.equal(status, 2, args.join(' '));
+    assert.equal(stdout, '');
+    const [first, hint, ...rest] = stderr.split('\n');
+    assert.match(first, /^bilinormal: /);
+    assert.match(first, message);
+    assert.equal(hint, 'Try bilinormal --help');
+    assert.deepEqual(rest, ['']);
+  }
+});
+
+test('an error ends with 1 and one line that names the file; no output appears', () => {
+  writeFileSync(join(folder, 'short.ply'), ply.subarray(0, 1000));
+  writeFileSync(join(folder, 'points.xyz'), '0 0 1\n0 1 0\n');
+  writeFileSync(join(folder, 'empty.ply'), '');
+  const cases = [
+    [['missing.ply', '-o', 'never.ply'], /^bilinormal: missing\.ply: no such file or folder\n$/],
+    [['.', '-o', 'never.ply'], /^bilinormal: \.: it is a folder\n$/],
+    [['short.ply', '-o', 'never.ply'], /^bilinormal: short\.ply: byte \d+: .*\n$/],
+    [['points.xyz', '-o', 'never.ply'], /^bilinormal: points\.xyz: .*(ply|PLY).*\n$/],
+    [['empty.ply', '-o', 'never.ply'], /^bilinormal: empty\.ply: .+\n$/],
+    [['sphere.ply', '-o', 'no/never.ply'], /^bilinormal: no\/never\.ply: no such file or folder\n$/],
+    [['sphere.ply', '-o', '..'], /^bilinormal: \.\.: it is a folder\n$/],
+    [
+      ['sphere.ply', '-o', 'never.ply', '--cell-scale', '1e9'],
+      /^bilinormal: sphere\.ply: .*1000000000.*0\.1 to 100\n$/,
+    ],
+  ];
+  for (const [args, message] of cases) {
+    const { status, stdout, stderr } = run(args);
+    assert.equal(status, 1, args.join(' '));
+    assert.equal(stdout, '');
+    assert.match(stderr, message);
+  }
+  assert.ok(!readdirSync(folder).includes('never.ply'));
+  assert.deepEqual(leftovers(), []);
+});
+
+test('an interrupted run leaves no half file', { skip: process.platform === 'win32' }, async () => {
+  const count = 500000;
+  const large = Buffer.concat([Buffer.from(header(count)), Buffer.from(sphere(count).buffer)]);
+  writeFileSync(join(folder, 'large.ply'), large);
+  const child = spawn(process.execPath, [cli, 'large.ply', '-o', 'interrupted.ply', '--ascii'], {
+    cwd: folder,
+    stdio: 'ignore',
+  });
+  const ended = new Promise((resolve) => child.once('exit', (code, signal) => resolve({ code, signal })));
+  let running = true;
+  ended.then(() => (running = false));
+  // As soon as the temporary file is there, if it is seen at all.
+  while (running && !leftovers().length) await new Promise((resolve) => setTimeout(resolve, 1));
+  child.kill('SIGINT');
+  const { code, signal } = await ended;
+  assert.deepEqual(leftovers(), []);
+  const complete = readdirSync(folder).includes('interrupted.ply');
+  assert.ok(complete ? code === 0 || signal === 'SIGINT' : signal === 'SIGINT', `code ${code}, signal ${signal}`);
+  if (complete) assert.equal(propertyOf(written('interrupted.ply'), 'vertex', 'nz').values.length, count);
+});

@@ -1,0 +1,112 @@
+// The package itself: what is in it, how large it is, what importing it does, and its types.
+import assert from 'node:assert/strict';
+import { execFileSync, spawnSync } from 'node:child_process';
+import { copyFileSync, existsSync, readFileSync, readdirSync, statSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { test } from 'node:test';
+import { installPacked, root } from './packed.mjs';
+
+const { project, home, load } = installPacked();
+const manifest = JSON.parse(readFileSync(join(home, 'package.json'), 'utf8'));
+
+const node = (code) =>
+  spawnSync(process.execPath, ['--input-type=module', '-e', code], { cwd: project, encoding: 'utf8' });
+
+test('every export is there, and nothing that only the build needs', () => {
+  const paths = [
+    manifest.types,
+    ...Object.values(manifest.bin),
+    ...JSON.stringify(manifest.exports).match(/\.\/[^"*]*\.\w+/g),
+  ];
+  for (const path of paths.filter((path) => path.includes('dist'))) {
+    assert.ok(existsSync(join(home, path)), path);
+  }
+  assert.deepEqual(Object.keys(manifest.dependencies ?? {}), []);
+  const files = readdirSync(home, { recursive: true }).filter((path) => statSync(join(home, path)).isFile());
+  for (const file of files) {
+    assert.match(file, /^(package\.json|README\.md|CHANGELOG\.md|LICENSE-\w+|dist[/\\].*\.(js|d\.ts|wasm))$/);
+    assert.doesNotMatch(file, /\.ts$(?<!\.d\.ts)|\.map$|\.gitignore$/);
+  }
+  assert.match(readFileSync(join(home, 'dist', 'cli.js'), 'utf8'), /^#!\/usr\/bin\/env node\n/);
+});
+
+test('wasm files can be addressed by name', () => {
+  const { stdout } =
+    node(`console.log(import.meta.resolve('bilinormal/single.wasm'), import.meta.resolve('bilinormal/threads.wasm'),
+    import.meta.resolve('bilinormal/worker'))`);
+  assert.match(stdout, /single\/bilinormal_bg\.wasm .*threads\/bilinormal_bg\.wasm .*dist\/worker-node\.js/);
+});
+
+test('importing does nothing, and a process that is done ends without a word', () => {
+  const idle = node(`
+    import * as everything from 'bilinormal';
+    if (process.getActiveResourcesInfo().some((name) => /Worker|MessagePort/.test(name))) console.log('not idle');
+    console.log(Object.keys(everything).sort().join());`);
+  assert.equal(idle.stderr, '');
+  assert.equal(idle.stdout.trim(), 'BilinormalError,createEstimator,estimateNormals,features,readPointCloud,writePly');
+  const done = node(`
+    import { createEstimator, estimateNormals } from 'bilinormal';
+    await createEstimator({ threads: 2 });
+    console.log((await estimateNormals(new Float32Array(9))).normals.length);`);
+  assert.equal(done.stderr, '');
+  assert.equal(done.stdout, '9\n');
+  assert.equal(done.status, 0);
+});
+
+test('the entry for browsers can be imported where there is no browser', async () => {
+  const { stderr, stdout } = node(`
+    const { features } = await import(${JSON.stringify(`file://${home}/dist/index.js`)});
+    console.log(typeof features);`);
+  assert.equal(stderr, '');
+  assert.equal(stdout, 'function\n');
+});
+
+test('the point material is lit, and its properties can be changed', async (context) => {
+  const three = join(root, 'node_modules', 'three');
+  if (!existsSync(three)) return context.skip('three is not installed');
+  const { symlinkSync } = await import('node:fs');
+  symlinkSync(three, join(project, 'node_modules', 'three'), 'junction');
+  const { createPointMaterial } = await load('bilinormal/three');
+  const material = createPointMaterial({ shading: 'normals', size: 0.5, pixels: 3, color: '#ff0000' });
+  assert.ok(material.isShaderMaterial);
+  assert.deepEqual([material.shading, material.size, material.pixels, material.round], ['normals', 0.5, 3, true]);
+  material.shading = 'plain';
+  material.color = '#00ff00';
+  assert.equal(material.shading, 'plain');
+  assert.equal(material.color.getHexString(), '00ff00');
+  assert.throws(() => (material.shading = 'sparkling'), /sparkling; wanted one of shaded, normals, colors, plain/);
+  const copy = material.clone();
+  assert.deepEqual([copy.shading, copy.size, copy.pixels, copy.color.getHexString()], ['plain', 0.5, 3, '00ff00']);
+  const renderer = {
+    getRenderTarget: () => null,
+    getDrawingBufferSize: (size) => size.set(800, 600),
+    getPixelRatio: () => 2,
+  };
+  material.onBeforeRender(renderer);
+  assert.equal(material.uniforms.viewportHeight.value, 600);
+  assert.equal(material.uniforms.pixelRatio.value, 2);
+});
+
+test('the types accept what the documentation shows, and refuse what is wrong', () => {
+  const settings = {
+    compilerOptions: {
+      strict: true,
+      exactOptionalPropertyTypes: true,
+      module: 'nodenext',
+      target: 'es2022',
+      noEmit: true,
+      skipLibCheck: false,
+      types: [],
+      lib: ['es2022', 'dom', 'dom.iterable'],
+    },
+    files: ['types.ts'],
+  };
+  copyFileSync(join(root, 'tests', 'node', 'types.ts'), join(project, 'types.ts'));
+  writeFileSync(join(project, 'tsconfig.json'), JSON.stringify(settings));
+  const tsc = join(root, 'node_modules', 'typescript', 'bin', 'tsc');
+  try {
+    execFileSync(process.execPath, [tsc, '--project', project], { encoding: 'utf8' });
+  } catch (error) {
+    assert.fail(error.stdout);
+  }
+});
