@@ -151,6 +151,21 @@ test('a bad file gives a message that can be read, and the cloud before stays', 
   assert.ok(await page.locator('#error').isHidden());
 });
 
+test('points that are not finite and a stray one neither blank the view nor shrink the rest', async () => {
+  page = await browser.openPage(browser.isolated);
+  const file = spherePly(20_000);
+  const first = file.indexOf('end_header\n') + 'end_header\n'.length;
+  file.writeFloatLE(NaN, first);
+  file.writeFloatLE(Infinity, first + 16);
+  file.writeFloatLE(1e6, first + 24);
+  await drop(page, 'stray.ply', file);
+  const shown = await result(page, 'stray.ply');
+  assert.equal(shown.error, undefined);
+  assert.ok(shown.unresolved >= 2, `${shown.unresolved} unresolved`);
+  await page.getByRole('radio', { name: 'Normals' }).check();
+  assert.ok((await colorsShown(page, { side: 300 })) > 200);
+});
+
 test('a keyboard alone opens a file', async () => {
   page = await browser.openPage(browser.isolated);
   const focused = () => page.evaluate(() => document.activeElement.textContent.trim());
