@@ -116,7 +116,10 @@ function showResult(scan: Scan | undefined, report: Report | undefined): void {
   );
   facts.dataset['mode'] = report.mode;
 
-  const phases = Object.entries(report.milliseconds).filter(([phase]) => phase !== 'total');
+  const { total, ...inside } = report.milliseconds;
+  const phases = Object.entries(inside);
+  const around = total - phases.reduce((sum, [, milliseconds]) => sum + milliseconds, 0);
+  phases.push(['start of the worker, copies', Math.max(0, around)]);
   const bar = element('#status .bar');
   const list = element('#phases');
   bar.replaceChildren();
