@@ -44,8 +44,8 @@ export function buildPage() {
 }
 
 /**
- * Does a job unless it was done with the same input files, and answers whether it did. As a whole, because wasm-opt and the linker begin anew each
- * time; what has changed is left to cargo.
+ * Does a job unless it was done with the same input files, and answers whether it did. For each build as a whole,
+ * because the linker and wasm-opt begin anew each time; cargo knows what to compile.
  */
 function once(what, inputs, outputs, job) {
   const hash = createHash('sha256');

@@ -8,7 +8,7 @@ use crate::pca::Moments;
 use crate::points::{CHUNK, Points, reserve, zeroed};
 use crate::progress::Stage;
 use bytemuck::Zeroable;
-use glam::{IVec3, Vec3};
+use glam::{IVec3, UVec3, Vec3};
 use std::ops::Range;
 
 /// A point in its brick.
@@ -222,22 +222,23 @@ fn blocks(first_point: &[u32]) -> Vec<Range<usize>> {
     blocks
 }
 
-/// The cubes in and one deep around a brick: 6x6x6 of them.
+/// The cubes in and one deep round a brick: 6x6x6 places, x fastest, the brick's first cube at (1, 1, 1).
 pub(crate) struct Surroundings {
-    cubes: [u32; 6 * 6 * 6],
+    cubes: [u32; Self::CUBES],
 }
 
 impl Surroundings {
+    pub const CUBES: usize = 6 * 6 * 6;
     const EMPTY: u32 = u32::MAX;
 
     pub fn new() -> Self {
-        Self { cubes: [Self::EMPTY; 216] }
+        Self { cubes: [Self::EMPTY; Self::CUBES] }
     }
 
     /// Looks up the 27 bricks around and in place of brick `brick`.
     pub fn look(&mut self, grid: &Grid, brick: usize) {
         self.cubes.fill(Self::EMPTY);
-        for step in steps() {
+        for step in STEPS {
             let number = if step == IVec3::ZERO {
                 Some(brick as u32)
             } else {
@@ -245,32 +246,51 @@ impl Surroundings {
             };
             let Some(number) = number else { continue };
             let (mask, first) = (grid.masks[number as usize], grid.first_cube[number as usize]);
-            let shift = 4 * step + 1;
+            let shift = 4 * Self::stride(step);
             for bit in set_bits(mask & facing(step)) {
-                let cube = IVec3::new(bit as i32 & 3, bit as i32 >> 2 & 3, bit as i32 >> 4);
                 let before = (mask & ((1 << bit) - 1)).count_ones();
-                self.cubes[Self::slot(cube + shift)] = first + before;
+                self.cubes[Self::place(bit).wrapping_add_signed(shift)] = first + before;
             }
         }
     }
 
-    /// The number of the cube `step` away from the cube with bit `bit` of the brick, if it is occupied.
+    /// The number of the cube at a place, if it is occupied.
     #[inline]
-    pub fn cube(&self, bit: u32, step: IVec3) -> Option<usize> {
-        let centre = 1 + 6 + 36 + (bit & 3) + 6 * (bit >> 2 & 3) + 36 * (bit >> 4);
-        let cube = self.cubes[(centre as i32 + step.x + 6 * step.y + 36 * step.z) as usize];
-        (cube != Self::EMPTY).then_some(cube as usize)
+    pub fn cube(&self, place: usize) -> Option<usize> {
+        (self.cubes[place] != Self::EMPTY).then_some(self.cubes[place] as usize)
     }
 
-    fn slot(cube: IVec3) -> usize {
-        (cube.x + 6 * cube.y + 36 * cube.z) as usize
+    /// The place of the cube with bit `bit` of the brick.
+    #[inline]
+    pub fn place(bit: u32) -> usize {
+        (43 + (bit & 3) + 6 * (bit >> 2 & 3) + 36 * (bit >> 4)) as usize
+    }
+
+    /// What lies between the places of two cubes.
+    #[inline]
+    pub fn stride(step: IVec3) -> isize {
+        (step.x + 6 * step.y + 36 * step.z) as isize
+    }
+
+    /// The centre of the cube at a place, in the brick, in edges.
+    #[inline]
+    pub fn centre(place: usize) -> Vec3 {
+        let place = place as u32;
+        UVec3::new(place % 6, place / 6 % 6, place / 36).as_vec3() - 0.5
     }
 }
 
 /// The 27 steps from a cube to itself and its neighbours, x fastest.
-pub(crate) fn steps() -> impl Iterator<Item = IVec3> {
-    (0..27).map(|i| IVec3::new(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1))
-}
+pub(crate) const STEPS: [IVec3; 27] = {
+    let mut steps = [IVec3::ZERO; 27];
+    let mut i = 0;
+    while i < 27 {
+        let n = i as i32;
+        steps[i] = IVec3::new(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+        i += 1;
+    }
+    steps
+};
 
 /// The cubes of the brick `step` away that touch this brick.
 fn facing(step: IVec3) -> u64 {

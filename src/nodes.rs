@@ -2,7 +2,7 @@
 
 use crate::bricks::set_bits;
 use crate::error::Error;
-use crate::grid::{Grid, Surroundings, steps};
+use crate::grid::{Grid, STEPS, Surroundings};
 use crate::parallel::Scatter;
 use crate::pca::Moments;
 use crate::points::zeroed;
@@ -53,8 +53,9 @@ pub(crate) fn nodes(grid: &Grid, moments: &[Moments], stage: &Stage) -> Result<V
             surroundings.look(grid, brick);
             for (cube, bit) in (grid.first_cube[brick] as usize..).zip(set_bits(grid.masks[brick])) {
                 let mut sum = Moments::zeroed();
-                for step in steps() {
-                    if let Some(cube) = surroundings.cube(bit, step) {
+                let place = Surroundings::place(bit);
+                for step in STEPS {
+                    if let Some(cube) = surroundings.cube(place.wrapping_add_signed(Surroundings::stride(step))) {
                         sum.add_shifted(&moments[cube], step);
                     }
                 }

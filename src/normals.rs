@@ -1,14 +1,13 @@
 //! One normal for each point, interpolated between the nodes round it.
 
 use crate::error::Error;
-use crate::grid::{Grid, Placed, Surroundings, steps};
+use crate::grid::{Grid, Placed, Surroundings};
 use crate::lattice::cube_centre;
 use crate::nodes::Node;
 use crate::parallel::Scatter;
 use crate::points::zeroed;
 use crate::progress::Stage;
-use bytemuck::Zeroable;
-use glam::{IVec3, Vec3, Vec4};
+use glam::{Vec3, Vec4};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// What came out for the points of the input, in its order.
@@ -28,11 +27,13 @@ pub(crate) fn interpolate(grid: &Grid, nodes: &[Node], count: usize, stage: &Sta
     let (all_used, all_resolved) = ([const { AtomicU64::new(0) }; 5], AtomicU64::new(0));
     stage.run(grid.blocks.len(), &|block| {
         let mut surroundings = Surroundings::new();
+        let mut good = GoodNodes::NONE;
         let (mut used, mut resolved) = ([0; 5], 0);
         for brick in grid.blocks[block].clone() {
             surroundings.look(grid, brick);
-            for (points, bit) in grid.cubes_of(brick) {
-                Cube::new(&surroundings, nodes, bit).interpolate(points, |normal, count, point| {
+            good.fill(&surroundings, nodes);
+            for (cube, (points, bit)) in (grid.first_cube[brick] as usize..).zip(grid.cubes_of(brick)) {
+                Cube::new(&good, nodes[cube], bit).interpolate(points, |normal, count, point| {
                     used[count] += 1;
                     resolved += u64::from(normal != Vec3::ZERO);
                     // SAFETY: every point of the input stands in the grid once at the most.
@@ -49,19 +50,140 @@ pub(crate) fn interpolate(grid: &Grid, nodes: &[Node], count: usize, stage: &Sta
     Ok(Normals { normals, nodes_used, unresolved: count as u64 - all_resolved.into_inner() })
 }
 
-/// All that the points of one cube share: its node and the 26 round it, sorted into columns along one axis.
-///
-/// Positions are against the centre of the cube, in edges. "u" and "v" are the two axes after `axis`, cyclically.
+/// A node that takes part in the interpolation.
+#[derive(Clone, Copy)]
+struct GoodNode {
+    /// In the brick, in edges.
+    position: Vec3,
+    /// Zero where there is no such node.
+    normal: Vec3,
+}
+
+/// The good nodes of the 6x6x6 cubes in and round a brick, in the order of [`Surroundings`].
+struct GoodNodes([GoodNode; Surroundings::CUBES]);
+
+impl GoodNodes {
+    const NONE: Self = Self([GoodNode { position: Vec3::ZERO, normal: Vec3::ZERO }; Surroundings::CUBES]);
+
+    fn fill(&mut self, surroundings: &Surroundings, nodes: &[Node]) {
+        for (place, good) in self.0.iter_mut().enumerate() {
+            good.normal = Vec3::ZERO;
+            if let Some(cube) = surroundings.cube(place)
+                && nodes[cube].is_good()
+            {
+                let Node { normal, .. } = nodes[cube];
+                *good = GoodNode { position: Surroundings::centre(place) + nodes[cube].position(), normal };
+            }
+        }
+    }
+}
+
+/// All that the points of one cube share. "u" and "v" are the two axes after the axis of projection, cyclically.
 struct Cube<'a> {
-    surroundings: &'a Surroundings,
-    nodes: &'a [Node],
-    bit: u32,
-    /// The plane of the cube, whether or not the cube holds its node.
-    own: Node,
-    /// The axis of projection: where the own normal is largest.
-    axis: usize,
-    /// For the points below and above the centre along the axis, the node of each of the 9 columns.
-    columns: [[Option<Seen>; 9]; 2],
+    nodes: &'a GoodNodes,
+    /// The place of the cube among the 6x6x6.
+    place: usize,
+    centre: Vec3,
+    /// The plane of the cube, whether or not the cube holds its node; zero if it has none.
+    own: Vec3,
+    /// Where the own normal is largest, then u and v.
+    axes: [usize; 3],
+    /// For the points below and above the centre along the axis, the place of the node of each of the 9 columns.
+    columns: [[Option<u8>; 9]; 2],
+}
+
+/// What lies between two places next to each other along x, y and z.
+const STRIDES: [isize; 3] = [1, 6, 36];
+
+impl<'a> Cube<'a> {
+    fn new(nodes: &'a GoodNodes, own: Node, bit: u32) -> Self {
+        let place = Surroundings::place(bit);
+        let centre = cube_centre(bit);
+        let axis = own.normal.abs().max_position();
+        let axes = [axis, (axis + 1) % 3, (axis + 2) % 3];
+        let mut cube = Self { nodes, place, centre, own: own.normal, axes, columns: [[None; 9]; 2] };
+        if own.has_plane() {
+            cube.fill_columns(own.normal.dot(centre) + own.offset);
+        }
+        cube
+    }
+
+    /// Takes from the two cubes of each column the node that lies nearer to the own plane, `own . x = offset`.
+    fn fill_columns(&mut self, offset: f32) {
+        let [along, along_u, along_v] = self.axes.map(|axis| STRIDES[axis]);
+        for (number, place) in self.places(along_u, along_v).enumerate() {
+            let candidate = |step: isize| {
+                let place = place.wrapping_add_signed(step * along);
+                let node = &self.nodes.0[place];
+                let is_there = node.normal != Vec3::ZERO;
+                is_there.then(|| ((self.own.dot(node.position) - offset).abs(), place as u8))
+            };
+            let middle = candidate(0);
+            for (side, step) in [(0, -1), (1, 1)] {
+                let nearer = match (middle, candidate(step)) {
+                    (Some(a), Some(b)) => Some(if b.0 < a.0 { b } else { a }),
+                    (a, b) => a.or(b),
+                };
+                self.columns[side][number] = nearer.map(|(_, place)| place);
+            }
+        }
+    }
+
+    /// The nine places round this cube's in the plane of two axes, the first of them fastest.
+    fn places(&self, along_u: isize, along_v: isize) -> impl Iterator<Item = usize> + use<> {
+        let place = self.place;
+        [-1, 0, 1]
+            .into_iter()
+            .flat_map(move |v| [-1, 0, 1].map(|u| place.wrapping_add_signed(u * along_u + v * along_v)))
+    }
+
+    /// Calls `resolve(normal, nodes used, number of the point)` for each point of the cube.
+    fn interpolate(&self, points: &[Placed], mut resolve: impl FnMut(Vec3, usize, u32)) {
+        // What the points of each octant share, from when the first of them asks.
+        let mut octants = [const { None }; 8];
+        let [axis, axis_u, axis_v] = self.axes;
+        let centre = self.centre.to_array();
+        for placed in points {
+            let point = placed.local.to_array();
+            let is_above = |axis: usize| usize::from(point[axis] >= centre[axis]);
+            let number = is_above(axis_u) + 2 * is_above(axis_v) + 4 * is_above(axis);
+            let octant = octants[number].get_or_insert_with(|| self.octant(number));
+            let normal = match octant.used {
+                0 => self.nearest(placed.local),
+                _ => octant.normal(point[axis_u], point[axis_v]).unwrap_or(self.own),
+            };
+            resolve(normal, octant.used, placed.point);
+        }
+    }
+
+    /// Bits 0, 1 and 2 of the number tell whether the octant lies above the centre along u, v and the axis.
+    fn octant(&self, number: usize) -> Octant {
+        let columns = &self.columns[number >> 2];
+        let far = if number & 1 == 1 { 1 } else { -1 };
+        let row = if number & 2 == 2 { 3 } else { -3 };
+        Octant::new([4, 4 + far, 4 + row, 4 + far + row].map(|column: i32| {
+            columns[column as usize].map(|place| {
+                let GoodNode { position, normal } = self.nodes.0[usize::from(place)];
+                let normal = if normal.dot(self.own) < 0.0 { -normal } else { normal };
+                Seen { u: position[self.axes[1]], normal_and_v: normal.extend(position[self.axes[2]]) }
+            })
+        }))
+    }
+
+    /// The normal of the nearest node in the 27 cubes; without any, that of the own plane, which may be zero.
+    fn nearest(&self, point: Vec3) -> Vec3 {
+        let mut nearest = (f32::INFINITY, self.own);
+        for step in [-36, 0, 36] {
+            for place in self.places(1, 6) {
+                let node = &self.nodes.0[place.wrapping_add_signed(step)];
+                let distance = node.position.distance_squared(point);
+                if node.normal != Vec3::ZERO && distance < nearest.0 {
+                    nearest = (distance, node.normal);
+                }
+            }
+        }
+        nearest.1
+    }
 }
 
 /// A node as the points of a cube see it.
@@ -70,82 +192,6 @@ struct Seen {
     u: f32,
     /// The normal, on the own normal's side, and v.
     normal_and_v: Vec4,
-}
-
-impl<'a> Cube<'a> {
-    fn new(surroundings: &'a Surroundings, nodes: &'a [Node], bit: u32) -> Self {
-        let own = surroundings.cube(bit, IVec3::ZERO).map_or(Node::zeroed(), |cube| nodes[cube]);
-        let axis = own.normal.abs().max_position();
-        let mut cube = Self { surroundings, nodes, bit, own, axis, columns: [[None; 9]; 2] };
-        if own.has_plane() {
-            cube.fill_columns();
-        }
-        cube
-    }
-
-    /// The good nodes in the 27 cubes: the step to the cube, position, and normal on the own normal's side.
-    fn good_nodes(&self) -> impl Iterator<Item = (IVec3, Vec3, Vec3)> {
-        let (surroundings, nodes, bit, own) = (self.surroundings, self.nodes, self.bit, self.own.normal);
-        steps()
-            .filter_map(move |step| surroundings.cube(bit, step).map(|cube| (step, nodes[cube])))
-            .filter(|(_, node)| node.is_good())
-            .map(move |(step, node)| {
-                let normal = if node.normal.dot(own) < 0.0 { -node.normal } else { node.normal };
-                (step, node.position() + step.as_vec3(), normal)
-            })
-    }
-
-    /// Takes from the two cubes of each column the node that lies nearer to the own plane.
-    fn fill_columns(&mut self) {
-        let (axis, u, v) = (self.axis, (self.axis + 1) % 3, (self.axis + 2) % 3);
-        let mut nearest = [[f32::INFINITY; 9]; 2];
-        let mut columns = [[None; 9]; 2];
-        for (step, position, normal) in self.good_nodes() {
-            let seen = Seen { u: position[u], normal_and_v: normal.extend(position[v]) };
-            let distance = (self.own.normal.dot(position) - self.own.offset).abs();
-            let column = (step[u] + 1 + 3 * (step[v] + 1)) as usize;
-            for (side, outward) in [(0, -1), (1, 1)] {
-                let within = step[axis] == 0 || step[axis] == outward;
-                if within && distance < nearest[side][column] {
-                    nearest[side][column] = distance;
-                    columns[side][column] = Some(seen);
-                }
-            }
-        }
-        self.columns = columns;
-    }
-
-    /// Calls `resolve(normal, nodes used, number of the point)` for each point of the cube.
-    fn interpolate(&self, points: &[Placed], mut resolve: impl FnMut(Vec3, usize, u32)) {
-        let (axis_u, axis_v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
-        // What the points of each octant share, from when the first of them asks.
-        let mut octants = [const { None }; 8];
-        let centre = cube_centre(self.bit);
-        for placed in points {
-            let point = placed.local - centre;
-            let along = point.to_array();
-            let (u, v, w) = (along[axis_u], along[axis_v], along[self.axis]);
-            let number = usize::from(u >= 0.0) + 2 * usize::from(v >= 0.0) + 4 * usize::from(w >= 0.0);
-            let octant = octants[number].get_or_insert_with(|| Octant::new(&self.columns[number / 4], number));
-            let normal = match octant.used {
-                0 => self.nearest(point),
-                _ => octant.normal(u, v).unwrap_or(self.own.normal),
-            };
-            resolve(normal, octant.used, placed.point);
-        }
-    }
-
-    /// The normal of the nearest node in the 27 cubes; without any, that of the own plane, which may be zero.
-    fn nearest(&self, point: Vec3) -> Vec3 {
-        let mut nearest = (f32::INFINITY, self.own.normal);
-        for (_, position, normal) in self.good_nodes() {
-            let distance = position.distance_squared(point);
-            if distance < nearest.0 {
-                nearest = (distance, normal);
-            }
-        }
-        nearest.1
-    }
 }
 
 /// Two nodes next to each other along u; also what lies between them.
@@ -185,14 +231,11 @@ struct Octant {
 }
 
 impl Octant {
-    const EMPTY: Pair = Pair { u: 0.0, scale: 0.0, first: Vec4::ZERO, gain: Vec4::ZERO };
-
-    fn new(columns: &[Option<Seen>; 9], number: usize) -> Self {
-        let far = if number & 1 == 1 { 5 } else { 3 };
-        let row = if number & 2 == 2 { 6 } else { 0 };
-        let block = [columns[4], columns[far], columns[row + 1], columns[row + far - 3]];
-        let (near, next) = (Pair::new(block[0], block[1]), Pair::new(block[2], block[3]));
-        let pairs = [near.or(next).unwrap_or(Self::EMPTY), next.or(near).unwrap_or(Self::EMPTY)];
+    /// From the nodes at the near and far column along u, in the near and then in the far row.
+    fn new(block: [Option<Seen>; 4]) -> Self {
+        const NONE: Pair = Pair { u: 0.0, scale: 0.0, first: Vec4::ZERO, gain: Vec4::ZERO };
+        let (near, far) = (Pair::new(block[0], block[1]), Pair::new(block[2], block[3]));
+        let pairs = [near.or(far).unwrap_or(NONE), far.or(near).unwrap_or(NONE)];
         Self { pairs, used: block.iter().flatten().count() }
     }
 
