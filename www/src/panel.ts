@@ -36,7 +36,7 @@ export function showState(store: Store): void {
     unsupported.hidden = state.unsupported === undefined;
     unsupported.textContent = state.unsupported ?? '';
     for (const button of document.querySelectorAll<HTMLButtonElement>('[data-do=choose], [data-do=sample]')) {
-      button.disabled = state.unsupported !== undefined;
+      button.disabled = !state.ready;
     }
 
     element('#name').textContent = scan?.name ?? 'bilinormal';
