@@ -43,6 +43,11 @@ impl<'a> Points<'a> {
         Ok(Points { positions: Cow::Owned(positions), origin: median, unit })
     }
 
+    /// What the positions are relative to, in the coordinates of the input.
+    pub fn origin(&self) -> [f64; 3] {
+        self.origin.to_array()
+    }
+
     /// The number of points.
     pub fn len(&self) -> usize {
         self.positions.len()
@@ -129,7 +134,7 @@ impl Bounds {
                 min[lane] = if value < min[lane] { value } else { min[lane] };
                 max[lane] = if value > max[lane] { value } else { max[lane] };
                 // Not a number as soon as one value is infinite or not a number.
-                spoilt[lane] += value - value;
+                spoilt[lane] += value * 0.0;
             }
         }
         if spoilt.iter().any(|s| s.is_nan()) {

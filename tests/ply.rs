@@ -200,7 +200,7 @@ fn other_line_ends_blanks_and_letter_cases_are_read() {
 
 #[test]
 fn a_binary_body_begins_right_after_the_header_whatever_its_bytes() {
-    for first in [b'\n', b'\r', b' '] {
+    for first in *b"\n\r " {
         for line_end in ["\n", "\r", "\r\n"] {
             let header =
                 "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty uchar tag\nproperty char x\n\

@@ -105,7 +105,9 @@ fn double_precision_far_from_the_origin() {
     let cloud = sphere(50_000, 15);
     let shift = [500_000.0, 5_000_000.0, 100.0];
     let far: Vec<f64> = cloud.points.iter().zip(shift.iter().cycle()).map(|(c, s)| f64::from(*c) + s).collect();
-    let far = estimate(&Points::from_f64(&far).unwrap(), &Options::default(), &Progress::silent()).unwrap();
+    let far = Points::from_f64(&far).unwrap();
+    assert!(far.origin().iter().zip(shift).all(|(origin, shift)| (origin - shift).abs() < 1.0));
+    let far = estimate(&far, &Options::default(), &Progress::silent()).unwrap();
     let near = run(&cloud.points, Cell::Auto);
     assert!((far.report.cell_size / near.report.cell_size - 1.0).abs() < 0.01);
     let (far, near) = (angles(&far.normals, &cloud.normals), angles(&near.normals, &cloud.normals));
