@@ -49,6 +49,7 @@ export async function openBrowser() {
       });
       if (options.script) await page.addInitScript(options.script);
       await page.goto(address);
+      await page.locator('[data-do=choose]:enabled, #unsupported:not([hidden])').first().waitFor({ state: 'attached' });
       return page;
     },
     /** Errors on a page and requests to other hosts since the last call. */

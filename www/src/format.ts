@@ -1,4 +1,4 @@
-// Numbers and phase names as a person reads them.
+// Numbers and names as a person reads them.
 
 const whole = new Intl.NumberFormat('en');
 
@@ -19,3 +19,6 @@ export function duration(milliseconds: number): string {
 
 /** "10 points", "1 point". */
 export const plural = (value: number, noun: string) => `${count(value)} ${noun}${value === 1 ? '' : 's'}`;
+
+/** A phase as the report names it, in words: "cellSize" is "cell size". */
+export const phaseName = (phase: string) => phase.replace(/[A-Z]/g, (letter) => ` ${letter.toLowerCase()}`);

@@ -12,7 +12,7 @@ showState(store);
 
 const unsupported = await missing();
 if (unsupported === undefined) start(createViewer(element('#canvas')));
-else store.set({ unsupported });
+store.set({ unsupported, ready: unsupported === undefined });
 
 function start(viewer: Viewer): void {
   const session = createSession(store, viewer);
@@ -50,8 +50,11 @@ function start(viewer: Viewer): void {
   small.addEventListener('change', () => viewer.setMargins(marginsOf(small)));
   let named: string | undefined;
   store.listen(({ scan }) => {
-    if (scan?.name !== named) viewer.setMargins(marginsOf(small));
+    if (scan?.name === named) return;
     named = scan?.name;
+    // The panel takes its place with the first scan, and the view makes room for it.
+    viewer.setMargins(marginsOf(small));
+    viewer.fit();
   });
 
   if (new URLSearchParams(location.search).has('sample')) void session.openSample();
@@ -62,7 +65,7 @@ function marginsOf(small: MediaQueryList): Margins {
   const { offsetWidth: width, offsetTop: gap } = element('#panel');
   const title = element('#panel > summary').offsetHeight;
   if (small.matches) return { top: title + gap, right: 0, bottom: 150, left: 0 };
-  return { top: 0, right: width + gap, bottom: 0, left: innerWidth > 1000 ? 240 : 0 };
+  return { top: 0, right: width + gap, bottom: 0, left: innerWidth > 1000 ? 170 : 0 };
 }
 
 /** Files dropped anywhere on the window. */

@@ -1,7 +1,7 @@
 // Draws the state into the document. Nothing is remembered here: every part is a function of the state.
 import type { Report } from 'bilinormal';
 import { parseCell } from './cell';
-import { count, duration, measure, plural } from './format';
+import { count, duration, measure, phaseName, plural } from './format';
 import type { Scan, State, Store } from './state';
 
 export function element<T extends HTMLElement>(selector: string): T {
@@ -36,7 +36,7 @@ export function showState(store: Store): void {
     unsupported.hidden = state.unsupported === undefined;
     unsupported.textContent = state.unsupported ?? '';
     for (const button of document.querySelectorAll<HTMLButtonElement>('[data-do=choose], [data-do=sample]')) {
-      button.disabled = state.unsupported !== undefined;
+      button.disabled = !state.ready;
     }
 
     element('#name').textContent = scan?.name ?? 'bilinormal';
@@ -63,11 +63,12 @@ function showCell({ cellKind, cellText, scan }: State, busy: boolean): void {
   check('cell', cellKind);
   const input = element<HTMLInputElement>('#cell-value');
   input.hidden = cellKind === 'auto';
-  input.ariaLabel = cellKind === 'scale' ? 'Cell edge in multiples of L' : 'Cell edge in the unit of the file';
+  const label = cellKind === 'scale' ? 'Cell edge in multiples of L' : 'Cell edge in the unit of the file';
+  input.setAttribute('aria-label', label);
   if (input.value !== cellText) input.value = cellText;
   const choice = parseCell(cellKind, cellText);
   const problem = 'problem' in choice ? choice.problem : '';
-  input.ariaInvalid = String(problem !== '');
+  input.setAttribute('aria-invalid', String(problem !== ''));
   const note = element('#cell-problem');
   note.hidden = problem === '';
   note.textContent = problem;
@@ -86,7 +87,7 @@ function showJob({ job }: State): void {
   element('#job').hidden = job === undefined;
   if (!job) return;
   element('#job-title').textContent = job.title;
-  element('#job-phase').textContent = job.phase;
+  element('#job-phase').textContent = phaseName(job.phase);
   const bar = element<HTMLProgressElement>('#job progress');
   if (job.fraction === undefined) bar.removeAttribute('value');
   else bar.value = job.fraction;
@@ -115,7 +116,10 @@ function showResult(scan: Scan | undefined, report: Report | undefined): void {
   );
   facts.dataset['mode'] = report.mode;
 
-  const phases = Object.entries(report.milliseconds).filter(([phase]) => phase !== 'total');
+  const { total, ...inside } = report.milliseconds;
+  const phases = Object.entries(inside);
+  const around = total - phases.reduce((sum, [, milliseconds]) => sum + milliseconds, 0);
+  phases.push(['start of the worker, copies', Math.max(0, around)]);
   const bar = element('#status .bar');
   const list = element('#phases');
   bar.replaceChildren();
@@ -123,9 +127,9 @@ function showResult(scan: Scan | undefined, report: Report | undefined): void {
   for (const [phase, milliseconds] of phases) {
     const part = make('span', '');
     part.style.flexGrow = String(milliseconds);
-    part.title = `${phase}: ${duration(milliseconds)}`;
+    part.title = `${phaseName(phase)}: ${duration(milliseconds)}`;
     bar.append(part);
-    list.append(make('dt', phase), make('dd', duration(milliseconds)));
+    list.append(make('dt', phaseName(phase)), make('dd', duration(milliseconds)));
   }
   list.append(make('dt', 'reading the file', 'apart'), make('dd', duration(scan.readMilliseconds), 'apart'));
 }

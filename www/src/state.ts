@@ -22,6 +22,8 @@ export interface Job {
 }
 
 export interface State {
+  /** Whether files can be taken: false until the browser has been looked at. */
+  ready: boolean;
   /** Why this browser cannot run the page at all. */
   unsupported: string | undefined;
   scan: Scan | undefined;
@@ -44,6 +46,7 @@ export interface Store {
 
 export function createStore(): Store {
   let state: State = {
+    ready: false,
     unsupported: undefined,
     scan: undefined,
     report: undefined,

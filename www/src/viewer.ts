@@ -259,9 +259,16 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       fit();
     },
     setNormals(normals) {
-      const attribute = new BufferAttribute(normals, 3);
-      whole.setAttribute('normal', attribute);
-      sparse?.setAttribute('normal', attribute);
+      const before = whole.getAttribute('normal');
+      if (before instanceof BufferAttribute) {
+        // The same buffer on the graphics card takes the new values.
+        before.array = normals;
+        before.needsUpdate = true;
+      } else {
+        const attribute = new BufferAttribute(normals, 3);
+        whole.setAttribute('normal', attribute);
+        sparse?.setAttribute('normal', attribute);
+      }
       chooseShading();
       request();
     },
