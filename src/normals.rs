@@ -1,7 +1,7 @@
 //! One normal for each point, interpolated between the nodes round it.
 
 use crate::error::Error;
-use crate::grid::{Grid, Placed, Surroundings};
+use crate::grid::{Grid, Placed, STEPS, Surroundings};
 use crate::lattice::cube_centre;
 use crate::nodes::Node;
 use crate::parallel::{self, Filling};
@@ -96,53 +96,46 @@ struct Cube<'a> {
     own: Vec3,
     /// Where the own normal is largest, then u and v.
     axes: [usize; 3],
-    /// For the points below and above the centre along the axis, the place of the node of each of the 9 columns.
-    columns: [[Option<u8>; 9]; 2],
+    /// What lies between two places next to each other along these axes.
+    strides: [usize; 3],
+    /// For the points below and above the centre along the axis, the place of the node of each of the 9 columns, if it
+    /// has one.
+    columns: [[u8; 9]; 2],
 }
-
-/// What lies between two places next to each other along x, y and z.
-const STRIDES: [isize; 3] = [1, 6, 36];
 
 impl<'a> Cube<'a> {
     fn new(nodes: &'a GoodNodes, own: Node, bit: u32) -> Self {
         let place = Surroundings::place(bit);
         let centre = cube_centre(bit);
-        let axis = own.normal.abs().max_position();
-        let axes = [axis, (axis + 1) % 3, (axis + 2) % 3];
-        let mut cube = Self { nodes, place, centre, own: own.normal, axes, columns: [[None; 9]; 2] };
-        if own.has_plane() {
-            cube.fill_columns(own.normal.dot(centre) + own.offset);
-        }
+        let (axes, strides) = match own.normal.abs().max_position() {
+            0 => ([0, 1, 2], [1, 6, 36]),
+            1 => ([1, 2, 0], [6, 36, 1]),
+            _ => ([2, 0, 1], [36, 1, 6]),
+        };
+        let mut cube = Self { nodes, place, centre, own: own.normal, axes, strides, columns: [[0; 9]; 2] };
+        cube.fill_columns(own.normal.dot(centre) + own.offset);
         cube
     }
 
     /// Takes from the two cubes of each column the node that lies nearer to the own plane, `own . x = offset`.
     fn fill_columns(&mut self, offset: f32) {
-        let [along, along_u, along_v] = self.axes.map(|axis| STRIDES[axis]);
-        for (number, place) in self.places(along_u, along_v).enumerate() {
-            let candidate = |step: isize| {
-                let place = place.wrapping_add_signed(step * along);
-                let node = &self.nodes.0[place];
-                let is_there = node.normal != Vec3::ZERO;
-                is_there.then(|| ((self.own.dot(node.position) - offset).abs(), place as u8))
-            };
-            let middle = candidate(0);
-            for (side, step) in [(0, -1), (1, 1)] {
-                let nearer = match (middle, candidate(step)) {
-                    (Some(a), Some(b)) => Some(if b.0 < a.0 { b } else { a }),
-                    (a, b) => a.or(b),
-                };
-                self.columns[side][number] = nearer.map(|(_, place)| place);
-            }
+        let [along, along_u, along_v] = self.strides;
+        // The first of the 27 places.
+        let corner = self.place - along - along_u - along_v;
+        for number in 0..9 {
+            let below = corner + number % 3 * along_u + number / 3 * along_v;
+            let (middle, above) = (below + along, below + 2 * along);
+            let distance = self.distance(middle, offset);
+            self.columns[0][number] = if self.distance(below, offset) < distance { below } else { middle } as u8;
+            self.columns[1][number] = if self.distance(above, offset) < distance { above } else { middle } as u8;
         }
     }
 
-    /// The nine places round this cube's in the plane of two axes, the first of them fastest.
-    fn places(&self, along_u: isize, along_v: isize) -> impl Iterator<Item = usize> + use<> {
-        let place = self.place;
-        [-1, 0, 1]
-            .into_iter()
-            .flat_map(move |v| [-1, 0, 1].map(|u| place.wrapping_add_signed(u * along_u + v * along_v)))
+    /// How far the node at a place lies from the own plane; infinitely far if there is none.
+    #[inline]
+    fn distance(&self, place: usize, offset: f32) -> f32 {
+        let node = &self.nodes.0[place];
+        if node.normal == Vec3::ZERO { f32::INFINITY } else { (self.own.dot(node.position) - offset).abs() }
     }
 
     /// Calls `resolve(normal, nodes used, number of the point)` for each point of the cube.
@@ -166,28 +159,35 @@ impl<'a> Cube<'a> {
 
     /// Bits 0, 1 and 2 of the number tell whether the octant lies above the centre along u, v and the axis.
     fn octant(&self, number: usize) -> Octant {
+        if self.own == Vec3::ZERO {
+            // Without an own plane there is no axis and no common side: the points take the nearest node.
+            return Octant::new(None, None, None, None);
+        }
         let columns = &self.columns[number >> 2];
-        let far = if number & 1 == 1 { 1 } else { -1 };
-        let row = if number & 2 == 2 { 3 } else { -3 };
-        Octant::new([4, 4 + far, 4 + row, 4 + far + row].map(|column: i32| {
-            columns[column as usize].map(|place| {
-                let GoodNode { position, normal } = self.nodes.0[usize::from(place)];
-                let normal = if normal.dot(self.own) < 0.0 { -normal } else { normal };
-                Seen { u: position[self.axes[1]], normal_and_v: normal.extend(position[self.axes[2]]) }
-            })
-        }))
+        let (far, row) = (if number & 1 == 1 { 5 } else { 3 }, if number & 2 == 2 { 7 } else { 1 });
+        let seen = |column: usize| self.see(columns[column]);
+        Octant::new(seen(4), seen(far), seen(row), seen(row + far - 4))
+    }
+
+    /// The node at a place, if there is one.
+    #[inline]
+    fn see(&self, place: u8) -> Option<Seen> {
+        let GoodNode { position, normal } = self.nodes.0[usize::from(place)];
+        let side = normal.dot(self.own);
+        let normal = if side < 0.0 { -normal } else { normal };
+        let position = position.to_array();
+        let [_, u, v] = self.axes;
+        (normal != Vec3::ZERO).then(|| Seen { u: position[u], normal_and_v: normal.extend(position[v]) })
     }
 
     /// The normal of the nearest node in the 27 cubes; without any, that of the own plane, which may be zero.
     fn nearest(&self, point: Vec3) -> Vec3 {
         let mut nearest = (f32::INFINITY, self.own);
-        for step in [-36, 0, 36] {
-            for place in self.places(1, 6) {
-                let node = &self.nodes.0[place.wrapping_add_signed(step)];
-                let distance = node.position.distance_squared(point);
-                if node.normal != Vec3::ZERO && distance < nearest.0 {
-                    nearest = (distance, node.normal);
-                }
+        for step in STEPS {
+            let node = &self.nodes.0[self.place.wrapping_add_signed(Surroundings::stride(step))];
+            let distance = node.position.distance_squared(point);
+            if node.normal != Vec3::ZERO && distance < nearest.0 {
+                nearest = (distance, node.normal);
             }
         }
         nearest.1
@@ -239,12 +239,13 @@ struct Octant {
 }
 
 impl Octant {
-    /// From the nodes at the near and far column along u, in the near and then in the far row.
-    fn new(block: [Option<Seen>; 4]) -> Self {
+    /// From the nodes at the near and far column along u, in the near row and in the far row.
+    fn new(a: Option<Seen>, b: Option<Seen>, c: Option<Seen>, d: Option<Seen>) -> Self {
         const NONE: Pair = Pair { u: 0.0, scale: 0.0, first: Vec4::ZERO, gain: Vec4::ZERO };
-        let (near, far) = (Pair::new(block[0], block[1]), Pair::new(block[2], block[3]));
+        let used = [a.is_some(), b.is_some(), c.is_some(), d.is_some()].iter().filter(|is_there| **is_there).count();
+        let (near, far) = (Pair::new(a, b), Pair::new(c, d));
         let pairs = [near.or(far).unwrap_or(NONE), far.or(near).unwrap_or(NONE)];
-        Self { pairs, used: block.iter().flatten().count() }
+        Self { pairs, used }
     }
 
     /// The interpolated unit normal (paper, Eq. 15 to 17); `None` where the nodes cancel each other.
