@@ -39,14 +39,18 @@ pub enum Place {
 }
 
 impl Error {
-    /// A [`Error::Format`] that belongs to one place of the file.
-    pub(crate) fn format_at(place: Place, message: impl Into<String>) -> Self {
-        Self::Format { message: message.into(), place: Some(place) }
+    /// A [`Error::Format`] that belongs to one place of the file, or to the file as a whole.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn format(place: Option<Place>, message: fmt::Arguments) -> Self {
+        Self::Format { message: message.to_string(), place }
     }
 
-    /// A [`Error::Format`] that belongs to the file as a whole.
-    pub(crate) fn format(message: impl Into<String>) -> Self {
-        Self::Format { message: message.into(), place: None }
+    /// A [`Error::Input`].
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn input(message: fmt::Arguments) -> Self {
+        Self::Input(message.to_string())
     }
 
     /// A [`Error::Limit`] for an allocation that the system refused.

@@ -17,6 +17,7 @@ mod grid;
 mod lattice;
 mod nodes;
 mod normals;
+mod number;
 mod options;
 mod parallel;
 mod pca;

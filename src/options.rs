@@ -1,6 +1,7 @@
 //! Every option, with its default, unit, range and advice.
 
 use crate::error::Error;
+use crate::number::text;
 
 /// What to estimate, and how. `Options::default()` is right for most scans.
 #[derive(Clone, Debug, PartialEq, Default)]
@@ -68,11 +69,11 @@ impl Options {
             Cell::Auto => {}
             Cell::Scale(scale) if (0.1..=100.0).contains(&scale) => {}
             Cell::Scale(scale) => {
-                return Err(Error::Input(format!("cell.scale is {scale}; wanted a number from 0.1 to 100")));
+                return Err(Error::Input(format!("cell.scale is {}; wanted a number from 0.1 to 100", text(scale))));
             }
             Cell::Size(size) if size > 0.0 && size.is_finite() => {}
             Cell::Size(size) => {
-                return Err(Error::Input(format!("cell.size is {size}; wanted a finite number above 0")));
+                return Err(Error::Input(format!("cell.size is {}; wanted a finite number above 0", text(size))));
             }
         }
         if self.k == Some(0) {

@@ -17,19 +17,6 @@ pub(crate) fn threads() -> usize {
     return 1;
 }
 
-/// Calls `work` once for each task and collects the answers in the order of the tasks.
-pub(crate) fn map<T: Send, R: Send>(tasks: Vec<T>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
-    let mut slots: Vec<(Option<T>, Option<R>)> = tasks.into_iter().map(|task| (Some(task), None)).collect();
-    let count = slots.len();
-    let shared = Scatter::new(&mut slots);
-    each(count, &|i| {
-        // SAFETY: `each` passes every number once, so this slot is this call's alone.
-        let (task, answer) = &mut unsafe { shared.slice(i..i + 1) }[0];
-        *answer = task.take().map(&work);
-    });
-    slots.into_iter().filter_map(|(_, answer)| answer).collect()
-}
-
 /// Calls `work` once for each number below `count`. Not generic, so that rayon is compiled once: the size of the module
 /// is what a page waits for.
 pub(crate) fn each(count: usize, work: &(dyn Fn(usize) + Sync)) {

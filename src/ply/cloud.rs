@@ -1,114 +1,84 @@
 //! A PLY file from a cloud alone.
 
-use super::scalar::Scalar;
+use super::columns::NAMES;
 use super::sink::Sink;
-use super::waves::{TASK, in_waves};
-use super::{Additions, Format, PointCloud};
+use super::{Additions, PointCloud, write};
 use crate::error::Error;
+use crate::number::print_whole;
+use crate::progress::Progress;
 
 /// Writes a cloud as a PLY file: positions, then normals, `red green blue alpha`, `intensity` and `curvature` where
 /// they are there, then the comments in the header.
 ///
 /// Positions are `float` with a zero origin, else `double` with the origin added. Normals of `add` take the place of
-/// the cloud's. Little-endian, or text with `ascii`. Takes memory for the output, checked first.
+/// the cloud's. Little-endian, or text with `ascii`. Takes memory for the output, checked first; for text also for the
+/// file that is not text.
 ///
 /// Errors: [`Error::Input`] for arrays of different lengths, [`Error::Limit`] for too little memory.
 pub fn write_cloud(cloud: &PointCloud, add: &Additions, ascii: bool) -> Result<Vec<u8>, Error> {
     let count = cloud.len();
-    let rows = Rows {
-        cloud,
-        normals: add.normals.or(cloud.normals.as_deref()),
-        curvature: add.curvature,
-        shifted: cloud.origin != [0.0; 3],
-    };
+    let normals = add.normals.or(cloud.normals.as_deref());
+    let (colors, intensity) = (cloud.colors.as_deref(), cloud.intensity.as_deref());
     check(cloud.positions.len(), 3, count, "positions")?;
-    check(cloud.colors.as_ref().map_or(4 * count, Vec::len), 4, count, "colors")?;
-    check(cloud.intensity.as_ref().map_or(count, Vec::len), 1, count, "intensity")?;
-    Additions { normals: rows.normals, curvature: rows.curvature }.check(count as u64)?;
+    check(colors.map_or(4 * count, <[u8]>::len), 4, count, "colors")?;
+    check(intensity.map_or(count, <[f32]>::len), 1, count, "intensity")?;
+    Additions { normals, curvature: add.curvature }.check(count as u64)?;
 
-    let mut header = Sink::new(Vec::new(), false);
-    let format = if ascii { Format::Ascii } else { Format::BinaryLittleEndian };
-    header.append(format!("ply\nformat {} 1.0\n", format.name()).as_bytes())?;
+    let mut sink = Sink::new(true);
+    sink.append(b"ply\nformat binary_little_endian 1.0\n")?;
     for comment in &cloud.comments {
-        header.append(b"comment ")?;
-        header.append(comment.replace(['\n', '\r'], " ").as_bytes())?;
-        header.append(b"\n")?;
+        sink.append(b"comment ")?;
+        sink.line(comment.as_bytes())?;
     }
-    header.append(format!("element vertex {count}\n").as_bytes())?;
-    let mut row_bytes = 0_usize;
-    for (scalar, name) in rows.properties() {
-        header.append(format!("property {} {name}\n", scalar.name()).as_bytes())?;
-        row_bytes += scalar.size();
+    sink.append(b"element vertex ")?;
+    print_whole(&mut sink.bytes, count as u64);
+    sink.append(b"\n")?;
+    let shifted = cloud.origin != [0.0; 3];
+    let groups: [(bool, &[u8], usize, &[&str]); 5] = [
+        (true, if shifted { b"double" } else { b"float" }, if shifted { 8 } else { 4 }, NAMES[0].1),
+        (normals.is_some(), b"float", 4, NAMES[1].1),
+        (colors.is_some(), b"uchar", 1, NAMES[3].1),
+        (intensity.is_some(), b"float", 4, NAMES[6].1),
+        (add.curvature.is_some(), b"float", 4, &["curvature"]),
+    ];
+    let mut row = 0;
+    for (_, kind, size, names) in groups.iter().filter(|(there, ..)| *there) {
+        for name in *names {
+            sink.words(&[b"property", kind, name.as_bytes()])?;
+            row += size;
+        }
     }
-    header.append(b"end_header\n")?;
-    let mut sink = Sink::new(header.bytes, ascii);
-    if !ascii {
-        sink.make_room(row_bytes.saturating_mul(count))?;
-    }
-    let tasks = (0..count).step_by(TASK).collect();
-    let work = |first: usize| {
-        let mut sink = Sink::new(Vec::new(), ascii);
-        let last = (first + TASK).min(count);
-        sink.make_room((last - first) * row_bytes)?;
-        (first..last).try_for_each(|point| rows.put(point, &mut sink))?;
-        Ok(sink.bytes)
+    sink.append(b"end_header\n")?;
+    sink.make_room(row * count)?;
+
+    let out = &mut sink.bytes;
+    let floats = |out: &mut Vec<u8>, values: Option<&[f32]>, width: usize, point: usize| {
+        for value in values.map_or(&[][..], |values| &values[width * point..width * (point + 1)]) {
+            out.extend_from_slice(&value.to_le_bytes());
+        }
     };
-    in_waves(tasks, work, |bytes| sink.append(&bytes))?;
-    Ok(sink.bytes)
+    for point in 0..count {
+        if shifted {
+            for axis in 0..3 {
+                let value = cloud.origin[axis] + f64::from(cloud.positions[3 * point + axis]);
+                out.extend_from_slice(&value.to_le_bytes());
+            }
+        } else {
+            floats(out, Some(&cloud.positions), 3, point);
+        }
+        floats(out, normals, 3, point);
+        if let Some(colors) = colors {
+            out.extend_from_slice(&colors[4 * point..4 * point + 4]);
+        }
+        floats(out, intensity, 1, point);
+        floats(out, add.curvature, 1, point);
+    }
+    if ascii { write(out, &Additions::default(), true, &Progress::silent()) } else { Ok(sink.bytes) }
 }
 
 fn check(length: usize, each: usize, count: usize, name: &str) -> Result<(), Error> {
     if length == each * count {
         return Ok(());
     }
-    Err(Error::Input(format!("{name} has {length} values; wanted {each} for each of the {count} points")))
-}
-
-struct Rows<'a> {
-    cloud: &'a PointCloud,
-    normals: Option<&'a [f32]>,
-    curvature: Option<&'a [f32]>,
-    shifted: bool,
-}
-
-impl Rows<'_> {
-    fn properties(&self) -> Vec<(Scalar, &'static str)> {
-        let position = if self.shifted { Scalar::F64 } else { Scalar::F32 };
-        let groups: [(bool, Scalar, &[&str]); 5] = [
-            (true, position, &["x", "y", "z"]),
-            (self.normals.is_some(), Scalar::F32, &["nx", "ny", "nz"]),
-            (self.cloud.colors.is_some(), Scalar::U8, &["red", "green", "blue", "alpha"]),
-            (self.cloud.intensity.is_some(), Scalar::F32, &["intensity"]),
-            (self.curvature.is_some(), Scalar::F32, &["curvature"]),
-        ];
-        let there = groups.into_iter().filter(|(there, ..)| *there);
-        there.flat_map(|(_, scalar, names)| names.iter().map(move |name| (scalar, *name))).collect()
-    }
-
-    /// One row, in the order of `properties`. The lengths were checked.
-    fn put(&self, point: usize, sink: &mut Sink) -> Result<(), Error> {
-        let three = |values: &[f32]| [0, 1, 2].map(|axis| values[3 * point + axis]);
-        for (value, origin) in three(&self.cloud.positions).into_iter().zip(self.cloud.origin) {
-            if self.shifted {
-                sink.value(Scalar::F64, (origin + f64::from(value)).to_bits())?;
-            } else {
-                sink.float(value)?;
-            }
-        }
-        if let Some(normals) = self.normals {
-            three(normals).into_iter().try_for_each(|value| sink.float(value))?;
-        }
-        if let Some(colors) = &self.cloud.colors {
-            let channels = &colors[4 * point..4 * point + 4];
-            channels.iter().try_for_each(|value| sink.value(Scalar::U8, u64::from(*value)))?;
-        }
-        if let Some(intensity) = &self.cloud.intensity {
-            sink.float(intensity[point])?;
-        }
-        if let Some(curvature) = self.curvature {
-            sink.float(curvature[point])?;
-        }
-        sink.end_row();
-        Ok(())
-    }
+    Err(Error::input(format_args!("{name} has {length} values; wanted {each} for each of the {count} points")))
 }

@@ -1,14 +1,14 @@
 //! Which properties of a vertex mean what, and the arrays they go to.
 
-use super::header::{Element, Kind};
+use super::header::{Element, Kind, shorten};
 use super::scalar::{Scalar, bits};
 use crate::error::Error;
+use crate::parallel::Scatter;
 use crate::points::reserve;
 use glam::DVec3;
-use std::mem::take;
 
 /// One property that is read.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(super) struct Column {
     /// Its place among the properties.
     pub property: usize,
@@ -16,85 +16,95 @@ pub(super) struct Column {
     pub offset: usize,
     pub scalar: Scalar,
     pub target: Target,
+    /// The component there.
+    pub component: usize,
 }
 
-/// The array a property goes to, and the component there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The array a property goes to.
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Target {
-    Position(usize),
-    Normal(usize),
-    Color(usize),
+    Positions,
+    Normals,
+    Colors,
     Intensity,
 }
+use Target::*;
 
-const POSITION: [[&str; 3]; 1] = [["x", "y", "z"]];
-/// The names of existing normals; a writer replaces them.
-pub(super) const NORMAL: [[&str; 3]; 2] = [["nx", "ny", "nz"], ["normal_x", "normal_y", "normal_z"]];
-const COLOR: [[&str; 4]; 3] = [
-    ["red", "green", "blue", "alpha"],
-    ["diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"],
-    ["r", "g", "b", "a"],
+/// What properties are called, the usual names first. The writer replaces normals of all these names.
+pub(super) const NAMES: [(Target, &[&str]); 10] = [
+    (Positions, &["x", "y", "z"]),
+    (Normals, &["nx", "ny", "nz"]),
+    (Normals, &["normal_x", "normal_y", "normal_z"]),
+    (Colors, &["red", "green", "blue", "alpha"]),
+    (Colors, &["diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"]),
+    (Colors, &["r", "g", "b", "a"]),
+    (Intensity, &["intensity"]),
+    (Intensity, &["scalar_intensity"]),
+    (Intensity, &["reflectance"]),
+    (Intensity, &["scalar_reflectance"]),
 ];
-const INTENSITY: [[&str; 1]; 4] = [["intensity"], ["scalar_intensity"], ["reflectance"], ["scalar_reflectance"]];
 
 /// The properties of `vertex` that are read, positions first; none without all of x y z as plain numbers.
 pub(super) fn find(vertex: &Element) -> Result<Option<Vec<Column>>, Error> {
-    let mut columns = Vec::new();
-    if !group(vertex, &POSITION, 3, &mut columns, Target::Position) {
-        return Ok(None);
-    }
-    for column in &columns {
-        let name = &vertex.properties[column.property].name;
-        if vertex.properties.iter().filter(|property| property.name == *name).count() > 1 {
-            return Err(Error::format(format!("property {name} of element vertex is declared twice; wanted one")));
+    let mut columns: Vec<Column> = Vec::new();
+    for (target, names) in NAMES {
+        if has(&columns, target) {
+            continue;
+        }
+        let before = columns.len();
+        for (component, name) in names.iter().enumerate() {
+            if let Some(column) = column(vertex, name.as_bytes()) {
+                columns.push(Column { target, component, ..column });
+            } else if component < 3 {
+                // All or nothing, but for alpha.
+                columns.truncate(before);
+                break;
+            }
+        }
+        if columns.is_empty() {
+            return Ok(None);
         }
     }
-    group(vertex, &NORMAL, 3, &mut columns, Target::Normal);
-    group(vertex, &COLOR, 3, &mut columns, Target::Color);
-    group(vertex, &INTENSITY, 1, &mut columns, |_| Target::Intensity);
+    for column in &columns[..3] {
+        let name = vertex.properties[column.property].name;
+        if vertex.properties.iter().filter(|property| property.name == name).count() > 1 {
+            return Err(Error::format(
+                None,
+                format_args!("property {} of element vertex is declared twice; wanted one", shorten(name)),
+            ));
+        }
+    }
     Ok(Some(columns))
 }
 
-/// Adds the first of the `sets` of names of which the first `needed` are all there.
-fn group<const N: usize>(
-    vertex: &Element,
-    sets: &[[&str; N]],
-    needed: usize,
-    columns: &mut Vec<Column>,
-    target: impl Fn(usize) -> Target,
-) -> bool {
-    for names in sets {
-        let found = names.map(|name| column(vertex, name));
-        if found[..needed].iter().all(Option::is_some) {
-            let known = found.into_iter().enumerate();
-            columns.extend(known.filter_map(|(component, column)| {
-                column.map(|(property, offset, scalar)| Column { property, offset, scalar, target: target(component) })
-            }));
-            return true;
+/// The plain number called `name`, or called so in other letter case.
+fn column(vertex: &Element, name: &[u8]) -> Option<Column> {
+    let mut found = None;
+    let mut offset = 0;
+    for (property, declared) in vertex.properties.iter().enumerate() {
+        let Kind::Scalar(scalar) = declared.kind else {
+            continue;
+        };
+        let exact = declared.name == name;
+        if exact || found.is_none() && declared.name.eq_ignore_ascii_case(name) {
+            found = Some(Column { property, offset, scalar, target: Positions, component: 0 });
         }
+        if exact {
+            break;
+        }
+        offset += scalar.size();
     }
-    false
+    found
 }
 
-/// Index, byte offset and type of the plain number called `name`, or called so in other letter case.
-fn column(vertex: &Element, name: &str) -> Option<(usize, usize, Scalar)> {
-    let plain = || {
-        let mut offset = 0;
-        vertex.properties.iter().enumerate().filter_map(move |(index, property)| {
-            let Kind::Scalar(scalar) = property.kind else {
-                return None;
-            };
-            offset += scalar.size();
-            Some((&property.name, (index, offset - scalar.size(), scalar)))
-        })
-    };
-    let exact = plain().find(|(other, _)| *other == name);
-    exact.or_else(|| plain().find(|(other, _)| other.eq_ignore_ascii_case(name))).map(|(_, found)| found)
+/// Whether any column goes to that array.
+pub(super) fn has(columns: &[Column], target: Target) -> bool {
+    columns.iter().any(|column| column.target == target)
 }
 
 /// Whether single precision may lose what the coordinates say.
 pub(super) fn is_wide(columns: &[Column]) -> bool {
-    columns.iter().any(|column| matches!(column.target, Target::Position(_)) && column.scalar.is_wide())
+    columns.iter().any(|column| column.target == Positions && column.scalar.is_wide())
 }
 
 /// The arrays of a cloud; those without a column stay empty.
@@ -108,101 +118,106 @@ pub(super) struct Arrays {
 impl Arrays {
     /// Takes memory for `count` points.
     pub fn new(columns: &[Column], count: usize) -> Result<Self, Error> {
-        fn filled<T: Copy>(wanted: bool, count: usize, value: T) -> Result<Vec<T>, Error> {
+        let floats = |target, width: usize| {
             let mut items = Vec::new();
-            if wanted {
-                reserve(&mut items, count, "the cloud")?;
-                items.resize(count, value);
+            if has(columns, target) {
+                reserve(&mut items, width * count, "the cloud")?;
+                items.resize(width * count, 0.0);
             }
-            Ok(items)
-        }
-        let has = |target| columns.iter().any(|column| column.target == target);
-        Ok(Self {
-            positions: filled(true, 3 * count, 0.0)?,
-            normals: filled(has(Target::Normal(0)), 3 * count, 0.0)?,
+            Ok::<Vec<f32>, Error>(items)
+        };
+        let mut colors = Vec::new();
+        if has(columns, Colors) {
+            reserve(&mut colors, 4 * count, "the cloud")?;
             // Opaque where the file has no alpha.
-            colors: filled(has(Target::Color(0)), 4 * count, 255)?,
-            intensity: filled(has(Target::Intensity), count, 0.0)?,
+            colors.resize(4 * count, 255);
+        }
+        Ok(Self {
+            positions: floats(Positions, 3)?,
+            normals: floats(Normals, 3)?,
+            colors,
+            intensity: floats(Intensity, 1)?,
         })
     }
 
-    /// Cuts the arrays into slices for so many points each.
-    pub fn slices(&mut self, counts: impl Iterator<Item = usize>) -> Vec<Slices<'_>> {
-        let (mut positions, mut normals) = (&mut self.positions[..], &mut self.normals[..]);
-        let (mut colors, mut intensity) = (&mut self.colors[..], &mut self.intensity[..]);
-        counts
-            .map(|count| Slices {
-                positions: split(&mut positions, 3 * count),
-                normals: split(&mut normals, 3 * count),
-                colors: split(&mut colors, 4 * count),
-                intensity: split(&mut intensity, count),
-            })
-            .collect()
+    /// To be filled by tasks, seen from an origin.
+    pub fn places(&mut self, origin: DVec3) -> Places<'_> {
+        Places {
+            floats: [
+                Scatter::new(&mut self.positions),
+                Scatter::new(&mut self.normals),
+                Scatter::new(&mut self.intensity),
+            ],
+            colors: Scatter::new(&mut self.colors),
+            origin,
+        }
     }
 }
 
-fn split<'a, T>(rest: &mut &'a mut [T], count: usize) -> &'a mut [T] {
-    let all = take(rest);
-    let (front, back) = all.split_at_mut(count.min(all.len()));
-    *rest = back;
-    front
+/// The arrays, each point of which one task writes.
+pub(super) struct Places<'a> {
+    floats: [Scatter<'a, f32>; 3],
+    colors: Scatter<'a, u8>,
+    origin: DVec3,
 }
 
-/// The places of some consecutive points in all arrays.
-pub(super) struct Slices<'a> {
-    positions: &'a mut [f32],
-    normals: &'a mut [f32],
-    colors: &'a mut [u8],
-    intensity: &'a mut [f32],
-}
-
-impl Slices<'_> {
-    /// Puts one value where it belongs.
-    pub fn store(&mut self, point: usize, column: &Column, value: f64, origin: DVec3) {
-        let (numbers, index, value) = match column.target {
-            Target::Position(axis) => (&mut *self.positions, 3 * point + axis, relative(value, origin[axis])),
-            Target::Normal(axis) => (&mut *self.normals, 3 * point + axis, value as f32),
-            Target::Intensity => (&mut *self.intensity, point, value as f32),
-            Target::Color(channel) => {
-                if let Some(place) = self.colors.get_mut(4 * point + channel) {
-                    *place = color(value, column.scalar);
-                }
-                return;
-            }
-        };
-        if let Some(place) = numbers.get_mut(index) {
-            *place = value;
+impl Places<'_> {
+    fn floats(&self, column: &Column) -> (&Scatter<'_, f32>, usize, f64) {
+        match column.target {
+            Positions => (&self.floats[0], 3, self.origin[column.component]),
+            Normals => (&self.floats[1], 3, 0.0),
+            Intensity | Colors => (&self.floats[2], 1, 0.0),
         }
     }
 
+    /// Puts one value where it belongs.
+    ///
+    /// # Safety
+    /// No other thread may write to the same point.
+    #[inline]
+    pub unsafe fn store(&self, point: usize, column: &Column, value: f64) {
+        if column.target == Colors {
+            let place = 4 * point + column.component;
+            // SAFETY: the caller's promise.
+            let place = unsafe { self.colors.slice(place..place + 1) };
+            place[0] = color(value, column.scalar);
+            return;
+        }
+        let (floats, width, origin) = self.floats(column);
+        let place = width * point + column.component;
+        // SAFETY: the caller's promise.
+        let place = unsafe { floats.slice(place..place + 1) };
+        place[0] = relative(value, origin);
+    }
+
     /// Reads one column of binary rows of `stride` bytes each to the points from `first` on.
-    pub fn store_column(
-        &mut self,
-        first: usize,
-        rows: &[u8],
-        stride: usize,
-        column: &Column,
-        origin: DVec3,
-        big_endian: bool,
-    ) {
-        let source = Source { rows, stride, offset: column.offset, first, big_endian };
-        let (numbers, width, component) = match column.target {
-            Target::Position(axis) => (&mut *self.positions, 3, axis),
-            Target::Normal(axis) => (&mut *self.normals, 3, axis),
-            Target::Intensity => (&mut *self.intensity, 1, 0),
-            Target::Color(channel) if column.scalar == Scalar::U8 => {
-                return source.each(self.colors, 4, channel, |[value]| value);
+    ///
+    /// # Safety
+    /// As for `store`, for all these points.
+    pub unsafe fn store_column(&self, first: usize, rows: &[u8], stride: usize, column: &Column, big_endian: bool) {
+        let source = Source { rows, stride, offset: column.offset, big_endian };
+        let end = first + rows.len() / stride;
+        if column.target == Colors && column.scalar == Scalar::U8 {
+            // SAFETY: the caller's promise.
+            let places = unsafe { self.colors.slice(4 * first..4 * end) };
+            return source.each(places, 4, column.component, |[value]| value);
+        }
+        let (floats, width, origin) = self.floats(column);
+        if column.target == Colors || !matches!(column.scalar, Scalar::F32 | Scalar::F64) {
+            for (row, point) in rows.chunks_exact(stride).zip(first..) {
+                let value = &row[column.offset..column.offset + column.scalar.size()];
+                // SAFETY: the caller's promise.
+                unsafe { self.store(point, column, column.scalar.to_f64(bits(value, big_endian))) };
             }
-            Target::Color(channel) => {
-                let scalar = column.scalar;
-                return source.each_value(self.colors, 4, channel, scalar, |value| color(value, scalar));
-            }
-        };
-        let origin = if let Target::Position(axis) = column.target { origin[axis] } else { 0.0 };
-        match column.scalar {
-            Scalar::F32 if origin == 0.0 => source.each(numbers, width, component, f32::from_le_bytes),
-            Scalar::F64 => source.each(numbers, width, component, |b| relative(f64::from_le_bytes(b), origin)),
-            scalar => source.each_value(numbers, width, component, scalar, |value| relative(value, origin)),
+            return;
+        }
+        // SAFETY: the caller's promise.
+        let places = unsafe { floats.slice(width * first..width * end) };
+        if column.scalar == Scalar::F64 {
+            source.each(places, width, column.component, |b| relative(f64::from_le_bytes(b), origin));
+        } else {
+            // A single is where the origin is zero.
+            source.each(places, width, column.component, f32::from_le_bytes);
         }
     }
 }
@@ -212,12 +227,12 @@ struct Source<'a> {
     rows: &'a [u8],
     stride: usize,
     offset: usize,
-    first: usize,
     big_endian: bool,
 }
 
 impl Source<'_> {
     /// Converts the `N` bytes of each row, in little-endian order, into one component of `places`.
+    #[inline]
     fn each<const N: usize, T>(
         &self,
         places: &mut [T],
@@ -225,32 +240,13 @@ impl Source<'_> {
         component: usize,
         convert: impl Fn([u8; N]) -> T,
     ) {
-        let places = places.get_mut(width * self.first..).unwrap_or_default();
         for (row, places) in self.rows.chunks_exact(self.stride).zip(places.chunks_exact_mut(width)) {
-            if let Some(bytes) = row.get(self.offset..).and_then(<[u8]>::first_chunk::<N>) {
+            if let Some(bytes) = row[self.offset..].first_chunk::<N>() {
                 let mut bytes = *bytes;
                 if self.big_endian {
                     bytes.reverse();
                 }
                 places[component] = convert(bytes);
-            }
-        }
-    }
-
-    /// The same for any type, slower.
-    fn each_value<T>(
-        &self,
-        places: &mut [T],
-        width: usize,
-        component: usize,
-        scalar: Scalar,
-        convert: impl Fn(f64) -> T,
-    ) {
-        let places = places.get_mut(width * self.first..).unwrap_or_default();
-        let bytes = self.offset..self.offset + scalar.size();
-        for (row, places) in self.rows.chunks_exact(self.stride).zip(places.chunks_exact_mut(width)) {
-            if let Some(bytes) = row.get(bytes.clone()) {
-                places[component] = convert(scalar.to_f64(bits(bytes, self.big_endian)));
             }
         }
     }
@@ -266,7 +262,7 @@ fn relative(value: f64, origin: f64) -> f32 {
 /// Floats run from 0 to 1; of 16 bits the upper 8 count; other whole numbers are taken as 0 to 255.
 fn color(value: f64, scalar: Scalar) -> u8 {
     match scalar {
-        Scalar::F32 | Scalar::F64 => (value * 255.0).round() as u8,
+        Scalar::F32 | Scalar::F64 => (value * 255.0 + 0.5) as u8,
         Scalar::U16 => (value / 256.0) as u8,
         // Written by those who have no unsigned type: the same byte.
         Scalar::I8 => value.clamp(-128.0, 255.0) as i64 as u8,

@@ -1,9 +1,9 @@
 //! The header of a PLY file: what the body holds, in which order, in which types.
 
 use super::Format;
-use super::scalar::{NAMES, Scalar};
+use super::scalar::{self, Scalar};
 use crate::error::{Error, Place};
-use std::borrow::Cow;
+use crate::number::parse_whole;
 
 /// No honest header comes near; bounds the work on a file that only begins like one.
 const HEADER_BYTES_MAX: usize = 16 << 20;
@@ -13,7 +13,7 @@ const ELEMENTS_MAX: usize = 4096;
 /// A parsed header, with its lines so that a writer can repeat them.
 pub(super) struct Header<'a> {
     pub format: Format,
-    pub elements: Vec<Element>,
+    pub elements: Vec<Element<'a>>,
     /// All lines between `ply` and `end_header` that are not blank, in their order.
     pub lines: Vec<Line<'a>>,
     /// The byte offset of the body.
@@ -40,55 +40,39 @@ pub(super) enum LineKind {
     Property(usize, usize),
 }
 
-pub(super) struct Element {
-    pub name: String,
+pub(super) struct Element<'a> {
+    pub name: &'a [u8],
     pub count: u64,
-    pub properties: Vec<Property>,
+    pub properties: Vec<Property<'a>>,
 }
 
-pub(super) struct Property {
-    pub name: String,
+pub(super) struct Property<'a> {
+    pub name: &'a [u8],
     pub kind: Kind,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Scalar(Scalar),
     List { count: Scalar, item: Scalar },
 }
 
-impl Element {
+impl Element<'_> {
     /// The bytes of every row in a binary file, or none when rows differ because of a list.
     pub fn stride(&self) -> Option<usize> {
-        self.properties.iter().map(|property| property.kind.fixed_size()).sum()
+        let mut stride = 0;
+        for property in &self.properties {
+            let Kind::Scalar(scalar) = property.kind else {
+                return None;
+            };
+            stride += scalar.size();
+        }
+        Some(stride)
     }
 
-    /// `vertex 12: float x, float y, list uchar int z`.
-    fn describe(&self) -> String {
-        const SHOWN: usize = 24;
-        let mut text = format!("{} {}:", self.name, self.count);
-        for (index, property) in self.properties.iter().take(SHOWN).enumerate() {
-            text.push_str(if index == 0 { " " } else { ", " });
-            match property.kind {
-                Kind::Scalar(scalar) => text.push_str(scalar.name()),
-                Kind::List { count, item } => text.push_str(&format!("list {} {}", count.name(), item.name())),
-            }
-            text.push(' ');
-            text.push_str(&property.name);
-        }
-        if self.properties.len() > SHOWN {
-            text.push_str(&format!(", and {} more", self.properties.len() - SHOWN));
-        }
-        text
-    }
-}
-
-impl Kind {
-    pub fn fixed_size(self) -> Option<usize> {
-        match self {
-            Self::Scalar(scalar) => Some(scalar.size()),
-            Self::List { .. } => None,
-        }
+    /// The name for an error text.
+    pub fn label(&self) -> String {
+        shorten(self.name)
     }
 }
 
@@ -98,7 +82,7 @@ impl<'a> Header<'a> {
         let start = if file.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
         let magic = file.get(start..start + 3).is_some_and(|word| word.eq_ignore_ascii_case(b"ply"));
         if !magic || file.get(start + 3).is_some_and(|byte| !byte.is_ascii_whitespace()) {
-            return Err(Error::format_at(Place::Byte(0), foreign(file)));
+            return Err(foreign(file));
         }
         let mut lines = Lines { file, at: start, number: 0, end: line_end(file, start) };
         lines.next();
@@ -111,73 +95,66 @@ impl<'a> Header<'a> {
             body_line: 0,
             line_end: lines.end,
         };
+        let wrong = |number, message| Err(Error::format(Some(Place::Line(number)), message));
         while let Some(text) = lines.next() {
             let number = lines.number;
-            let wrong = |message: String| Err(Error::format_at(Place::Line(number), message));
             if lines.at - start > HEADER_BYTES_MAX {
-                return wrong(format!("the header has no end_header within {} MiB", HEADER_BYTES_MAX >> 20));
+                return wrong(number, format_args!("the header has no end_header within 16 MiB"));
             }
-            let keyword = text.split(u8::is_ascii_whitespace).next().unwrap_or_default();
-            if matches!(keyword, b"" | b"comment" | b"obj_info") {
-                if !keyword.is_empty() {
-                    header.lines.push(Line { text, kind: LineKind::Comment });
-                }
-                continue;
-            }
-            let decoded = String::from_utf8_lossy(&text[keyword.len()..]);
-            let words: Vec<&str> = decoded.split_ascii_whitespace().collect();
-            let kind = match keyword {
+            let mut words = text;
+            let kind = match word(&mut words) {
+                b"" => continue,
+                b"comment" | b"obj_info" => LineKind::Comment,
                 b"end_header" => {
                     let Some(format) = format else {
-                        return wrong("the header has no format line; wanted 'format ascii 1.0' or the like".into());
+                        return wrong(number, format_args!("no format line; wanted one, as in 'format ascii 1.0'"));
                     };
                     header.format = format;
                     header.body = lines.at;
-                    header.body_line = lines.number + 1;
+                    header.body_line = number + 1;
                     return Ok(header);
                 }
-                b"format" => match parse_format(&words) {
-                    Ok(found) if format.is_none_or(|before| before == found) => {
-                        format = Some(found);
-                        LineKind::Format
+                b"format" => {
+                    let found = parse_format(text, words, number)?;
+                    if format.is_some_and(|before| before != found) {
+                        return wrong(number, format_args!("a second, different format line"));
                     }
-                    Ok(_) => return wrong("a second, different format line".into()),
-                    Err(message) => return wrong(message),
-                },
-                b"element" => match parse_element(&words) {
-                    Ok(element) => {
-                        if element.name == "vertex" && header.elements.iter().any(|other| other.name == "vertex") {
-                            return wrong("a second element named vertex; wanted one".into());
-                        }
-                        if header.elements.len() == ELEMENTS_MAX {
-                            return wrong(format!("more than {ELEMENTS_MAX} elements; wanted that many at most"));
-                        }
-                        header.elements.push(element);
-                        LineKind::Element(header.elements.len() - 1)
+                    format = Some(found);
+                    LineKind::Format
+                }
+                b"element" => {
+                    let element = parse_element(text, words, number)?;
+                    if element.name == b"vertex" && header.vertex().is_ok() {
+                        return wrong(number, format_args!("a second element named vertex; wanted one"));
                     }
-                    Err(message) => return wrong(message),
-                },
+                    if header.elements.len() == ELEMENTS_MAX {
+                        return wrong(number, format_args!("more than {ELEMENTS_MAX} elements"));
+                    }
+                    header.elements.push(element);
+                    LineKind::Element(header.elements.len() - 1)
+                }
                 b"property" => {
                     let owner = header.elements.len().wrapping_sub(1);
                     let Some(element) = header.elements.last_mut() else {
-                        return wrong("a property before the first element; wanted an element line above it".into());
+                        return wrong(number, format_args!("a property before the first element"));
                     };
-                    match parse_property(&words) {
-                        Ok(property) => element.properties.push(property),
-                        Err(message) => return wrong(message),
-                    }
+                    element.properties.push(parse_property(text, words, number)?);
                     LineKind::Property(owner, element.properties.len() - 1)
                 }
-                _ => {
-                    return wrong(format!(
-                        "'{}' is no word of a PLY header; wanted format, comment, obj_info, element, property or end_header",
-                        shorten(keyword)
-                    ));
+                other => {
+                    return wrong(
+                        number,
+                        format_args!(
+                            "'{}' is no word of a PLY header; wanted format, comment, obj_info, element, property or \
+                             end_header",
+                            shorten(other)
+                        ),
+                    );
                 }
             };
             header.lines.push(Line { text, kind });
         }
-        Err(Error::format_at(Place::Line(lines.number), "the file ends within the header; end_header is missing"))
+        wrong(lines.number, format_args!("the file ends within the header; end_header is missing"))
     }
 
     pub fn is_big_endian(&self) -> bool {
@@ -186,94 +163,114 @@ impl<'a> Header<'a> {
 
     /// The index of the element named `vertex`.
     pub fn vertex(&self) -> Result<usize, Error> {
-        self.elements
-            .iter()
-            .position(|element| element.name == "vertex")
-            .ok_or_else(|| Error::format(format!("the file has no element vertex; it has {}", self.describe())))
+        let found = self.elements.iter().position(|element| element.name == b"vertex");
+        found.ok_or_else(|| Error::format(None, format_args!("no element vertex; it has {}", self.describe())))
     }
 
     /// Why there are no points in element `vertex`, which lacks a coordinate.
+    #[cold]
     pub fn without_position(&self, vertex: &Element) -> Error {
-        if vertex.properties.iter().any(|property| property.name == "packed_position") {
+        if vertex.properties.iter().any(|property| property.name == b"packed_position") {
             return Error::format(
-                "a compressed Gaussian splat file: its positions are packed (packed_position, no x y z), which is not \
-                 supported; save it as an uncompressed splat PLY first",
+                None,
+                format_args!(
+                    "a compressed Gaussian splat file: its positions are packed, which is not supported; save it as an \
+                     uncompressed splat PLY first"
+                ),
             );
         }
-        Error::format(format!("the vertices have no x y z as plain numbers; the file has {}", self.describe()))
+        Error::format(None, format_args!("no x y z as plain numbers; the file has {}", self.describe()))
     }
 
     /// The texts of all comments and `obj_info` lines.
     pub fn comments(&self) -> Vec<String> {
-        let text = |line: &Line| {
-            let line = String::from_utf8_lossy(line.text);
-            let keyword = if line.starts_with("comment") { "comment" } else { "obj_info" };
-            line.strip_prefix(keyword).unwrap_or_default().trim().to_owned()
-        };
-        self.lines.iter().filter(|line| line.kind == LineKind::Comment).map(text).collect()
+        let mut comments = Vec::new();
+        for line in self.lines.iter().filter(|line| line.kind == LineKind::Comment) {
+            let mut text = line.text;
+            word(&mut text);
+            comments.push(decode(text));
+        }
+        comments
     }
 
+    /// `vertex 12: float x, float y; face 4: list uchar int z`.
+    #[cold]
     fn describe(&self) -> String {
-        const SHOWN: usize = 8;
-        if self.elements.is_empty() {
-            return "no elements at all".into();
-        }
-        let mut texts: Vec<String> = self.elements.iter().take(SHOWN).map(Element::describe).collect();
-        if self.elements.len() > SHOWN {
-            texts.push(format!("{} more elements", self.elements.len() - SHOWN));
-        }
-        texts.join("; ")
-    }
-}
-
-fn parse_format(words: &[&str]) -> Result<Format, String> {
-    const WANTED: &str = "wanted ascii, binary_little_endian or binary_big_endian";
-    let [name, version] = words else {
-        return Err(format!("'format {}'; {WANTED}, and the version 1.0", shorten(words.join(" ").as_bytes())));
-    };
-    if *version != "1.0" {
-        return Err(format!("version {}; wanted 1.0, the only one there is", shorten(version.as_bytes())));
-    }
-    match *name {
-        "ascii" => Ok(Format::Ascii),
-        "binary_little_endian" => Ok(Format::BinaryLittleEndian),
-        "binary_big_endian" => Ok(Format::BinaryBigEndian),
-        _ => Err(format!("format {}; {WANTED}", shorten(name.as_bytes()))),
-    }
-}
-
-fn parse_element(words: &[&str]) -> Result<Element, String> {
-    let [name, count] = words else {
-        return Err(format!(
-            "'element {}'; wanted a name and a count, as in 'element vertex 8'",
-            shorten(words.join(" ").as_bytes())
-        ));
-    };
-    let count = count.parse().map_err(|_| {
-        format!("{} as the count of element {name}; wanted a whole number from 0", shorten(count.as_bytes()))
-    })?;
-    Ok(Element { name: (*name).to_owned(), count, properties: Vec::new() })
-}
-
-fn parse_property(words: &[&str]) -> Result<Property, String> {
-    let scalar = |name: &str| {
-        Scalar::from_name(name).ok_or_else(|| format!("type {}; wanted one of {NAMES}", shorten(name.as_bytes())))
-    };
-    // A name with blanks in it is against the rules, but harmless.
-    match words {
-        ["list", count, item, _, ..] => {
-            let kind = Kind::List { count: scalar(count)?, item: scalar(item)? };
-            if matches!(kind, Kind::List { count, .. } if !count.is_integer()) {
-                return Err(format!("type {count} for the length of a list; wanted a whole-number type"));
+        const SHOWN: usize = 600;
+        let mut text = Vec::new();
+        let mut separator = ": ";
+        for line in &self.lines {
+            let before = match line.kind {
+                LineKind::Element(_) => {
+                    separator = ": ";
+                    if text.is_empty() { "" } else { "; " }
+                }
+                LineKind::Property(..) => std::mem::replace(&mut separator, ", "),
+                _ => continue,
+            };
+            if text.len() > SHOWN {
+                break;
             }
-            Ok(Property { name: words[3..].join(" "), kind })
+            let mut words = line.text;
+            word(&mut words);
+            text.extend_from_slice(before.as_bytes());
+            text.extend_from_slice(words);
         }
-        ["list", ..] | [] | [_] => Err(format!(
-            "'property {}'; wanted a type and a name, as in 'property float x' or 'property list uchar int vertex_indices'",
-            shorten(words.join(" ").as_bytes())
-        )),
-        [kind, ..] => Ok(Property { name: words[1..].join(" "), kind: Kind::Scalar(scalar(kind)?) }),
+        if text.is_empty() { "no elements".into() } else { quote(&text, SHOWN) }
     }
+}
+
+#[cold]
+#[inline(never)]
+fn mistake(line: u64, text: &[u8], wanted: &str) -> Error {
+    Error::format(Some(Place::Line(line)), format_args!("'{}'; wanted {wanted}", quote(text, 80)))
+}
+
+fn parse_format(text: &[u8], mut words: &[u8], line: u64) -> Result<Format, Error> {
+    let name = word(&mut words);
+    let format = [Format::Ascii, Format::BinaryLittleEndian, Format::BinaryBigEndian]
+        .into_iter()
+        .find(|format| format.name().as_bytes() == name);
+    match format {
+        Some(format) if words == b"1.0" => Ok(format),
+        _ => Err(mistake(line, text, "ascii, binary_little_endian or binary_big_endian, and the version 1.0")),
+    }
+}
+
+fn parse_element<'a>(text: &[u8], mut words: &'a [u8], line: u64) -> Result<Element<'a>, Error> {
+    let name = word(&mut words);
+    match parse_whole(words) {
+        Some((negative, count)) if !name.is_empty() && !negative => Ok(Element { name, count, properties: Vec::new() }),
+        _ => Err(mistake(line, text, "a name and a count from 0, as in 'element vertex 8'")),
+    }
+}
+
+fn parse_property<'a>(text: &[u8], mut words: &'a [u8], line: u64) -> Result<Property<'a>, Error> {
+    let scalar = |words: &mut &[u8]| Scalar::from_name(word(words)).ok_or_else(|| mistake(line, text, scalar::WANTED));
+    let mut rest = words;
+    let kind = if word(&mut rest) == b"list" {
+        words = rest;
+        let kind = Kind::List { count: scalar(&mut words)?, item: scalar(&mut words)? };
+        if matches!(kind, Kind::List { count, .. } if !count.is_integer()) {
+            return Err(mistake(line, text, "a whole-number type for the length of a list"));
+        }
+        kind
+    } else {
+        Kind::Scalar(scalar(&mut words)?)
+    };
+    if words.is_empty() {
+        return Err(mistake(line, text, "a type and a name, as in 'property list uchar int vertex_indices'"));
+    }
+    // A name with blanks in it is against the rules, but harmless.
+    Ok(Property { name: words, kind })
+}
+
+/// Takes the first word off a line, and the blanks after it.
+fn word<'a>(text: &mut &'a [u8]) -> &'a [u8] {
+    let length = text.iter().position(u8::is_ascii_whitespace).unwrap_or(text.len());
+    let (word, rest) = text.split_at(length);
+    *text = rest.trim_ascii_start();
+    word
 }
 
 /// The lines of a header, each without its end and without blanks round it.
@@ -307,42 +304,68 @@ fn line_end(file: &[u8], start: usize) -> u8 {
 }
 
 /// What a file without the first line `ply` is, where that can be told.
-fn foreign(file: &[u8]) -> String {
-    const KNOWN: [(&[u8], &str); 17] = [
-        (b"\x1f\x8b", "a gzip file; unpack it first"),
-        (b"PK\x03\x04", "a zip file; unpack it first"),
-        (b"BZh", "a bzip2 file; unpack it first"),
-        (b"\xfd7zXZ\0", "an xz file; unpack it first"),
-        (b"\x28\xb5\x2f\xfd", "a zstd file; unpack it first"),
-        (b"\xff\xfe", "text in UTF-16; save it as plain ASCII or UTF-8"),
-        (b"\xfe\xff", "text in UTF-16; save it as plain ASCII or UTF-8"),
-        (b"p\0l\0y\0", "text in UTF-16; save it as plain ASCII or UTF-8"),
-        (b"solid", "an STL file"),
-        (b"# .PCD", "a PCD file"),
-        (b"LASF", "a LAS or LAZ file"),
-        (b"ASTM-E57", "an E57 file"),
-        (b"glTF", "a binary glTF file"),
-        (b"OFF", "an OFF file"),
-        (b"version https://git-lfs", "a Git LFS pointer, not the file itself; fetch it with git lfs pull"),
-        (b"<!DOCTYPE", "a web page, not the file itself; the download went wrong"),
-        (b"<html", "a web page, not the file itself; the download went wrong"),
+#[cold]
+fn foreign(file: &[u8]) -> Error {
+    const UNPACK: &str = "; unpack it first";
+    const UTF_16: (&str, &str) = ("text in UTF-16", "; save it as plain ASCII or UTF-8");
+    const PAGE: (&str, &str) = ("a web page", ", not the file itself; the download went wrong");
+    const KNOWN: [(&[u8], (&str, &str)); 17] = [
+        (b"\x1f\x8b", ("a gzip file", UNPACK)),
+        (b"PK\x03\x04", ("a zip file", UNPACK)),
+        (b"BZh", ("a bzip2 file", UNPACK)),
+        (b"\xfd7zXZ\0", ("an xz file", UNPACK)),
+        (b"\x28\xb5\x2f\xfd", ("a zstd file", UNPACK)),
+        (b"\xff\xfe", UTF_16),
+        (b"\xfe\xff", UTF_16),
+        (b"p\0l\0y\0", UTF_16),
+        (b"solid", ("an STL file", "")),
+        (b"# .PCD", ("a PCD file", "")),
+        (b"LASF", ("a LAS or LAZ file", "")),
+        (b"ASTM-E57", ("an E57 file", "")),
+        (b"glTF", ("a binary glTF file", "")),
+        (b"OFF", ("an OFF file", "")),
+        (b"version https://git-lfs", ("a Git LFS pointer", "; fetch the file with git lfs pull")),
+        (b"<!DOCTYPE", PAGE),
+        (b"<html", PAGE),
     ];
+    let place = Some(Place::Byte(0));
     if file.is_empty() {
-        return "the file is empty; wanted a PLY file".into();
+        return Error::format(place, format_args!("the file is empty; wanted a PLY file"));
     }
-    if let Some((_, what)) = KNOWN.iter().find(|(magic, _)| file.starts_with(magic)) {
-        return format!("not a PLY file but {what}");
+    if let Some((_, (what, advice))) = KNOWN.iter().find(|(magic, _)| file.starts_with(magic)) {
+        return Error::format(place, format_args!("not a PLY file but {what}{advice}"));
     }
-    format!("not a PLY file: it begins with '{}'; wanted 'ply' as the first line", shorten(file))
+    let begin = shorten(file);
+    Error::format(place, format_args!("not a PLY file: it begins with '{begin}'; wanted 'ply' as the first line"))
 }
 
 /// A few bytes of a file for an error text.
 pub(super) fn shorten(bytes: &[u8]) -> String {
-    const SHOWN: usize = 32;
-    let text: Cow<str> = String::from_utf8_lossy(&bytes[..bytes.len().min(SHOWN)]);
-    let mut text: String = text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
-    if bytes.len() > SHOWN {
+    quote(bytes, 32)
+}
+
+/// Bytes of a file for an error text, at most so many.
+#[cold]
+#[inline(never)]
+fn quote(bytes: &[u8], most: usize) -> String {
+    let mut shown = bytes[..bytes.len().min(most)].to_vec();
+    for byte in &mut shown {
+        if byte.is_ascii_control() {
+            *byte = b'?';
+        }
+    }
+    let mut text = decode(&shown);
+    if bytes.len() > most {
         text.push('…');
     }
     text
+}
+
+/// Text of a file: UTF-8, or else Latin-1, which takes any bytes.
+#[inline(never)]
+pub(super) fn decode(bytes: &[u8]) -> String {
+    match str::from_utf8(bytes) {
+        Ok(text) => text.to_owned(),
+        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
+    }
 }

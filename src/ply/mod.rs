@@ -4,22 +4,22 @@
 //! cloud alone.
 //!
 //! ```text
-//! header ─┬─ text    where the rows of an ASCII body are, and their values ──┬─ reader ── columns ── PointCloud
-//!         └─ binary  where the elements of a binary body are, and their rows ┴─ writer ── sink ──── bytes
+//! header ── body ── cursor ─┬─ reader ── columns ── PointCloud
+//!                           └─ writer ── sink ───── bytes
 //! ```
 //!
 //! Nothing in a file is trusted: counts are compared with the bytes that are there before memory is taken, and every
 //! broken file ends in an [`Error::Format`](crate::Error::Format) that says where.
 
-mod binary;
+mod body;
 mod cloud;
 mod columns;
+mod cursor;
 mod header;
 mod reader;
 mod scalar;
 mod sink;
-mod text;
-mod waves;
+mod tasks;
 mod writer;
 
 use crate::points::Points;

@@ -15,99 +15,95 @@ pub(super) enum Scalar {
     F32,
     F64,
 }
+use Scalar::*;
 
-/// What a header may say, for error texts.
-pub(super) const NAMES: &str = "char, uchar, short, ushort, int, uint, float, double (or int8 ... float64)";
+/// What a header may say, for an error text.
+pub(super) const WANTED: &str = "a type: char, uchar, short, ushort, int, uint, float, double, int8 ... float64";
+
+/// The old name, the new one, and the type.
+const NAMES: [(&str, &str, Scalar); 10] = [
+    ("char", "int8", I8),
+    ("uchar", "uint8", U8),
+    ("short", "int16", I16),
+    ("ushort", "uint16", U16),
+    ("int", "int32", I32),
+    ("uint", "uint32", U32),
+    ("int64", "", I64),
+    ("uint64", "", U64),
+    ("float", "float32", F32),
+    ("double", "float64", F64),
+];
 
 impl Scalar {
-    pub fn from_name(name: &str) -> Option<Self> {
-        Some(match name {
-            "char" | "int8" => Self::I8,
-            "uchar" | "uint8" => Self::U8,
-            "short" | "int16" => Self::I16,
-            "ushort" | "uint16" => Self::U16,
-            "int" | "int32" => Self::I32,
-            "uint" | "uint32" => Self::U32,
-            "int64" => Self::I64,
-            "uint64" => Self::U64,
-            "float" | "float32" => Self::F32,
-            "double" | "float64" => Self::F64,
-            _ => return None,
-        })
+    pub fn from_name(name: &[u8]) -> Option<Self> {
+        let is = |other: &str| other.as_bytes() == name;
+        NAMES.iter().find(|(old, new, _)| is(old) || is(new)).map(|(.., scalar)| *scalar)
     }
 
     pub fn name(self) -> &'static str {
-        match self {
-            Self::I8 => "char",
-            Self::U8 => "uchar",
-            Self::I16 => "short",
-            Self::U16 => "ushort",
-            Self::I32 => "int",
-            Self::U32 => "uint",
-            Self::I64 => "int64",
-            Self::U64 => "uint64",
-            Self::F32 => "float",
-            Self::F64 => "double",
-        }
+        NAMES[self as usize].0
     }
 
     /// Bytes of one value in a binary file.
     pub fn size(self) -> usize {
         match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::I64 | Self::U64 | Self::F64 => 8,
+            I8 | U8 => 1,
+            I16 | U16 => 2,
+            I32 | U32 | F32 => 4,
+            I64 | U64 | F64 => 8,
         }
     }
 
     pub fn is_integer(self) -> bool {
-        !matches!(self, Self::F32 | Self::F64)
+        !matches!(self, F32 | F64)
+    }
+
+    pub fn is_signed(self) -> bool {
+        matches!(self, I8 | I16 | I32 | I64)
     }
 
     /// Whether single precision cannot hold every value.
     pub fn is_wide(self) -> bool {
-        self.size() == 8 || matches!(self, Self::I32 | Self::U32)
-    }
-
-    /// Least and greatest value of an integer type.
-    pub fn range(self) -> (i128, i128) {
-        match self {
-            Self::I8 => (i8::MIN.into(), i8::MAX.into()),
-            Self::U8 => (0, u8::MAX.into()),
-            Self::I16 => (i16::MIN.into(), i16::MAX.into()),
-            Self::U16 => (0, u16::MAX.into()),
-            Self::I32 => (i32::MIN.into(), i32::MAX.into()),
-            Self::U32 => (0, u32::MAX.into()),
-            Self::I64 => (i64::MIN.into(), i64::MAX.into()),
-            Self::U64 => (0, u64::MAX.into()),
-            Self::F32 | Self::F64 => (0, 0),
-        }
+        self.size() == 8 || matches!(self, I32 | U32)
     }
 
     /// The number that `bits` stand for, rounded to double precision where the type is wider.
     pub fn to_f64(self, bits: u64) -> f64 {
         match self {
-            Self::F32 => f64::from(f32::from_bits(bits as u32)),
-            Self::F64 => f64::from_bits(bits),
-            Self::U64 => bits as f64,
-            _ => self.to_i64(bits) as f64,
+            F32 => f64::from(f32::from_bits(bits as u32)),
+            F64 => f64::from_bits(bits),
+            _ if self.is_signed() => self.to_i64(bits) as f64,
+            _ => bits as f64,
         }
     }
 
-    /// The number that the `bits` of an integer stand for; not for the float types. `uint64` wraps.
+    /// The number that the `bits` of an integer stand for. `uint64` wraps.
     pub fn to_i64(self, bits: u64) -> i64 {
-        match self {
-            Self::I8 => i64::from(bits as i8),
-            Self::I16 => i64::from(bits as i16),
-            Self::I32 => i64::from(bits as i32),
-            _ => bits as i64,
+        if !self.is_signed() {
+            return bits as i64;
         }
+        let unused = 64 - 8 * self.size();
+        (bits << unused) as i64 >> unused
+    }
+
+    /// The bits of a whole number of that sign and size in an integer type; none if the type does not hold it.
+    pub fn from_whole(self, negative: bool, size: u64) -> Option<u64> {
+        let most = u64::MAX >> (64 - 8 * self.size());
+        let most = match (self.is_signed(), negative) {
+            (true, true) => most / 2 + 1,
+            (true, false) => most / 2,
+            (false, true) => 0,
+            (false, false) => most,
+        };
+        (size <= most).then_some(if negative { size.wrapping_neg() } else { size })
     }
 }
 
 /// The bits of one value of at most 8 bytes, moved to the low end of a word.
 pub(super) fn bits(bytes: &[u8], big_endian: bool) -> u64 {
-    let add = |word: u64, byte: &u8| (word << 8) | u64::from(*byte);
-    if big_endian { bytes.iter().fold(0, add) } else { bytes.iter().rev().fold(0, add) }
+    let mut word = [0; 8];
+    for (place, byte) in bytes.iter().enumerate() {
+        word[if big_endian { bytes.len() - 1 - place } else { place }] = *byte;
+    }
+    u64::from_le_bytes(word)
 }

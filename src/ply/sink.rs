@@ -2,21 +2,17 @@
 
 use super::scalar::Scalar;
 use crate::error::Error;
-use std::fmt::{self, Write};
+use crate::number::{print, print_whole};
 
 /// Bytes written so far. Memory is asked for, never taken for granted.
 pub(super) struct Sink {
     pub bytes: Vec<u8>,
-    text: bool,
+    pub text: bool,
 }
 
 impl Sink {
-    pub fn new(bytes: Vec<u8>, text: bool) -> Self {
-        Self { bytes, text }
-    }
-
-    pub fn is_text(&self) -> bool {
-        self.text
+    pub fn new(text: bool) -> Self {
+        Self { bytes: Vec::new(), text }
     }
 
     /// Takes memory for so many bytes more; with room to grow further, as a vector does.
@@ -25,20 +21,35 @@ impl Sink {
         self.bytes.try_reserve(bytes).map_err(|_| Error::memory("the PLY file", needed))
     }
 
+    #[inline(never)]
     pub fn append(&mut self, bytes: &[u8]) -> Result<(), Error> {
         self.make_room(bytes.len())?;
         self.bytes.extend_from_slice(bytes);
         Ok(())
     }
 
+    /// Words of a header line; the last one ends it.
+    pub fn words(&mut self, words: &[&[u8]]) -> Result<(), Error> {
+        for word in words {
+            self.append(word)?;
+            self.append(b" ")?;
+        }
+        self.end_row();
+        Ok(())
+    }
+
     /// A line of the source and its end. In a file whose lines end with `\r` alone, a line may hold a `\n`, which would
     /// end it here: it becomes a blank.
     pub fn line(&mut self, text: &[u8]) -> Result<(), Error> {
-        for (part, text) in text.split(|byte| matches!(byte, b'\n' | b'\r')).enumerate() {
-            self.append(if part > 0 { b" " } else { b"" })?;
-            self.append(text)?;
+        let start = self.bytes.len();
+        self.append(text)?;
+        self.append(b"\n")?;
+        for byte in &mut self.bytes[start..start + text.len()] {
+            if matches!(byte, b'\n' | b'\r') {
+                *byte = b' ';
+            }
         }
-        self.append(b"\n")
+        Ok(())
     }
 
     /// A value by its bits. Floats become the shortest text that reads back as the same value.
@@ -46,25 +57,23 @@ impl Sink {
         if !self.text {
             return self.append(&bits.to_le_bytes()[..scalar.size()]);
         }
-        let mut digits = Digits::default();
-        // Cannot fail: no number is longer than the digits' place.
-        let _ = match scalar {
-            Scalar::F32 => digits.float(f32::from_bits(bits as u32)),
-            Scalar::F64 => digits.float(f64::from_bits(bits)),
-            Scalar::U64 => write!(digits, "{bits}"),
-            _ => write!(digits, "{}", scalar.to_i64(bits)),
-        };
-        self.token(&digits.text[..digits.length])
+        // No number is longer.
+        self.make_room(32)?;
+        if scalar.is_integer() {
+            let negative = scalar.is_signed() && scalar.to_i64(bits) < 0;
+            if negative {
+                self.bytes.push(b'-');
+            }
+            print_whole(&mut self.bytes, if negative { scalar.to_i64(bits).unsigned_abs() } else { bits });
+        } else {
+            print(&mut self.bytes, scalar.to_f64(bits), scalar == Scalar::F32);
+        }
+        self.bytes.push(b' ');
+        Ok(())
     }
 
     pub fn float(&mut self, value: f32) -> Result<(), Error> {
         self.value(Scalar::F32, value.to_bits().into())
-    }
-
-    /// A value of a text file as it stands.
-    pub fn token(&mut self, token: &[u8]) -> Result<(), Error> {
-        self.append(token)?;
-        self.append(b" ")
     }
 
     pub fn end_row(&mut self) {
@@ -73,33 +82,5 @@ impl Sink {
         {
             *last = b'\n';
         }
-    }
-}
-
-/// The text of one number, without an allocation.
-#[derive(Default)]
-struct Digits {
-    text: [u8; 32],
-    length: usize,
-}
-
-impl Digits {
-    fn float<F: Into<f64> + Copy + fmt::Display + fmt::LowerExp>(&mut self, value: F) -> fmt::Result {
-        let wide: f64 = value.into();
-        if wide.is_nan() {
-            // Without the sign, which says nothing.
-            return self.write_str("nan");
-        }
-        let plain = wide == 0.0 || wide.is_infinite() || (1e-5..1e16).contains(&wide.abs());
-        if plain { write!(self, "{value}") } else { write!(self, "{value:e}") }
-    }
-}
-
-impl Write for Digits {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        let place = self.text.get_mut(self.length..self.length + text.len()).ok_or(fmt::Error)?;
-        place.copy_from_slice(text.as_bytes());
-        self.length += text.len();
-        Ok(())
     }
 }

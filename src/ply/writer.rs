@@ -1,14 +1,16 @@
 //! The file a cloud came from, with normals.
 
-use super::columns::{self, NORMAL};
+use super::body::{Body, Part};
+use super::columns::{self, NAMES, Target};
+use super::cursor::Cursor;
 use super::header::{Element, Header, Kind, LineKind};
-use super::scalar::{Scalar, bits};
+use super::scalar::Scalar;
 use super::sink::Sink;
-use super::text::{Cursor, Part, Rows, token_bits};
-use super::waves::{Meter, TASK, in_waves};
-use super::{Additions, Format, binary};
+use super::{Additions, Format, tasks};
 use crate::error::Error;
-use crate::progress::Progress;
+use crate::parallel::Scatter;
+use crate::progress::{Progress, Stage};
+use std::sync::{Mutex, PoisonError};
 
 /// Writes a PLY file again, with normals and curvature in place of those it had.
 ///
@@ -30,374 +32,253 @@ pub fn write(file: &[u8], add: &Additions, ascii: bool, progress: &Progress) -> 
     let vertex = &header.elements[index];
     columns::find(vertex)?.ok_or_else(|| header.without_position(vertex))?;
     add.check(vertex.count)?;
-    let plan = Plan::new(vertex, add);
     let body = Body::locate(&header, file)?;
-    // Without properties there is nothing to write, however many rows there are.
-    let filled = || header.elements.iter().enumerate().filter(|(_, element)| !element.properties.is_empty());
-    let total = filled().map(|(_, element)| element.count).sum();
-    let mut meter = Meter { progress, phase: "write", done: 0, total };
-    let mut sink = Sink::new(header_text(&header, index, &plan, ascii)?, ascii);
-    if let (Body::Binary(extents), false) = (&body, ascii) {
+    let steps = plan(vertex, Some(add));
+    let mut sink = Sink::new(true);
+    write_header(&header, index, &steps, ascii, &mut sink)?;
+    sink.text = ascii;
+    if header.format != Format::Ascii && !ascii {
         // Nothing grows but the vertices, so this is all that is ever needed.
-        let body: usize = extents.iter().map(|extent| extent.len()).sum();
-        sink.make_room(body.saturating_add(plan.added_bytes().saturating_mul(vertex.count as usize)))?;
+        let grown = steps.iter().filter(|step| step.put < Step::KEEP).count();
+        sink.make_room((file.len() - header.body).saturating_add(grown.saturating_mul(4 * vertex.count as usize)))?;
     }
-    for (number, element) in filled() {
-        let element_plan = if number == index { &plan } else { &Plan::copy(element) };
-        match &body {
-            Body::Binary(extents) => {
-                let rows = &file[extents[number].clone()];
-                let little_to_little = header.format == Format::BinaryLittleEndian && !ascii;
-                match element.stride() {
-                    _ if little_to_little && number != index => {
-                        sink.append(rows)?;
-                        meter.add(element.count as usize)?;
-                    }
-                    Some(stride) if little_to_little => {
-                        copy_fixed(rows, stride, vertex, &plan, add, &mut sink, &mut meter)?;
-                    }
-                    stride => {
-                        let task = stride.map_or(rows.len(), |stride| stride.saturating_mul(TASK)).max(1);
-                        let source = |(number, rows)| Source::Binary {
-                            rows,
-                            first: number * TASK,
-                            count: stride.map_or(element.count as usize, |stride| rows.len() / stride),
-                            big_endian: header.is_big_endian(),
-                        };
-                        let sources = rows.chunks(task).enumerate().map(source).collect();
-                        translate(sources, element, element_plan, add, &mut sink, &mut meter)?;
-                    }
-                }
+    // Without properties there is nothing to write, however many rows there are.
+    let filled = |element: &Element| if element.properties.is_empty() { 0.0 } else { element.count as f64 };
+    let total: f64 = header.elements.iter().map(filled).sum();
+    let mut done = 0.0;
+    for (number, element) in header.elements.iter().enumerate() {
+        let rows = filled(element);
+        let stage = progress.stage("write", done / total.max(1.0)..(done + rows) / total.max(1.0));
+        done += rows;
+        let steps = if number == index { &steps } else { &plan(element, None) };
+        let writer = Writer { element, steps, add, kept: number != index };
+        let parts = body.parts(number);
+        match element.stride() {
+            Some(stride) if header.format == Format::BinaryLittleEndian && !ascii => {
+                writer.copy(&parts, stride, &mut sink, &stage)?;
             }
-            Body::Text(rows) => {
-                let whole = ascii && number != index;
-                let sources = rows.parts(&rows.elements[number]).into_iter();
-                let sources = sources.map(|part| Source::Text { part, whole }).collect();
-                translate(sources, element, element_plan, add, &mut sink, &mut meter)?;
-            }
+            _ => writer.translate(&parts, &mut sink, &stage)?,
         }
     }
     progress.update("write", 1.0)?;
     Ok(sink.bytes)
 }
 
-/// Where the elements are.
-enum Body<'a> {
-    Binary(Vec<std::ops::Range<usize>>),
-    Text(Rows<'a>),
-}
-
-impl<'a> Body<'a> {
-    fn locate(header: &Header, file: &'a [u8]) -> Result<Self, Error> {
-        match header.format {
-            Format::Ascii => Ok(Self::Text(Rows::index(header, file)?)),
-            _ => Ok(Self::Binary(binary::extents(header, file)?)),
-        }
-    }
-}
-
 /// The properties that may be added.
 const ADDED: [&str; 4] = ["nx", "ny", "nz", "curvature"];
 
-/// What becomes of each property of an element.
-struct Plan {
-    actions: Vec<Action>,
-    /// What follows the last property, by index into `ADDED`.
-    appended: Vec<usize>,
+/// What becomes of a property, or what follows the last one.
+struct Step {
+    /// The property that is taken from the source, if any.
+    kind: Option<Kind>,
+    /// The index into `ADDED` of what is written, or `KEEP` or `DROP`.
+    put: usize,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Action {
-    Keep,
-    Drop,
-    /// The index into `ADDED` of what takes its place.
-    Replace(usize),
+impl Step {
+    const KEEP: usize = ADDED.len();
+    const DROP: usize = Self::KEEP + 1;
 }
 
-impl Plan {
-    fn copy(element: &Element) -> Self {
-        Self { actions: vec![Action::Keep; element.properties.len()], appended: Vec::new() }
-    }
-
-    fn new(vertex: &Element, add: &Additions) -> Self {
-        let wanted = |addition: usize| {
-            if addition < 3 { add.normals.is_some() } else { add.curvature.is_some() }
+/// One step for each property of the element, and more for what is new.
+fn plan(element: &Element, add: Option<&Additions>) -> Vec<Step> {
+    let is_wanted = |addition: usize| {
+        add.is_some_and(|add| if addition < 3 { add.normals.is_some() } else { add.curvature.is_some() })
+    };
+    let mut open = [0, 1, 2, 3].map(is_wanted);
+    let mut steps = Vec::new();
+    for property in &element.properties {
+        let is = |name: &str| property.name.eq_ignore_ascii_case(name.as_bytes());
+        let means = |addition: usize| {
+            let normal = |(target, names): &(Target, &[&str])| *target == Target::Normals && is(names[addition]);
+            if addition < 3 { NAMES.iter().any(normal) } else { is(ADDED[addition]) }
         };
-        let mut open: Vec<usize> = (0..ADDED.len()).filter(|addition| wanted(*addition)).collect();
-        let action = |name: &str| {
-            let replaced = |addition: &usize| {
-                let is = |other: &&str| other.eq_ignore_ascii_case(name);
-                is(&ADDED[*addition]) || NORMAL.iter().any(|names| names.get(*addition).is_some_and(is))
-            };
-            match (0..ADDED.len()).filter(|addition| wanted(*addition)).find(replaced) {
-                None => Action::Keep,
-                Some(addition) => match open.iter().position(|other| *other == addition) {
-                    Some(place) => Action::Replace(open.remove(place)),
-                    None => Action::Drop,
-                },
-            }
+        let put = match (0..ADDED.len()).find(|addition| is_wanted(*addition) && means(*addition)) {
+            None => Step::KEEP,
+            Some(addition) if std::mem::take(&mut open[addition]) => addition,
+            Some(_) => Step::DROP,
         };
-        let actions = vertex.properties.iter().map(|property| property.name.as_str()).map(action).collect();
-        Self { actions, appended: open }
+        steps.push(Step { kind: Some(property.kind), put });
     }
-
-    /// The most that a row can grow by.
-    fn added_bytes(&self) -> usize {
-        let replaced = self.actions.iter().filter(|action| matches!(action, Action::Replace(_))).count();
-        4 * (self.appended.len() + replaced)
+    for put in (0..ADDED.len()).filter(|addition| open[*addition]) {
+        steps.push(Step { kind: None, put });
     }
+    steps
 }
 
 impl Additions<'_> {
     /// Refuses additions that are not for `count` points.
     pub(super) fn check(&self, count: u64) -> Result<(), Error> {
-        if let Some(normals) = self.normals
-            && normals.len() as u128 != 3 * u128::from(count)
-        {
-            return Err(Error::Input(format!(
-                "normals has {} numbers; wanted 3 for each of the {count} points",
-                normals.len()
-            )));
-        }
-        if let Some(curvature) = self.curvature
-            && curvature.len() as u64 != count
-        {
-            return Err(Error::Input(format!(
-                "curvature has {} numbers; wanted one for each of the {count} points",
-                curvature.len()
-            )));
+        let lengths = [("normals", self.normals, 3), ("curvature", self.curvature, 1)];
+        for (name, numbers, each) in lengths {
+            let length = numbers.map_or(count.saturating_mul(each), |numbers| numbers.len() as u64);
+            if length != count.saturating_mul(each) {
+                return Err(Error::input(format_args!(
+                    "{name} has {length} numbers; wanted {each} for each of the {count} points"
+                )));
+            }
         }
         Ok(())
     }
 
     /// The value of `ADDED[addition]` at a point.
     fn value(&self, addition: usize, point: usize) -> f32 {
-        let found = match addition {
-            0..3 => self.normals.and_then(|normals| normals.get(3 * point + addition)),
-            _ => self.curvature.and_then(|curvature| curvature.get(point)),
-        };
+        let (numbers, place) =
+            if addition < 3 { (self.normals, 3 * point + addition) } else { (self.curvature, point) };
         // The lengths were checked.
-        found.copied().unwrap_or_default()
+        numbers.and_then(|numbers| numbers.get(place)).copied().unwrap_or_default()
     }
 }
 
 /// The header of the output: the lines of the source, with the format and the vertex properties changed.
-fn header_text(header: &Header, vertex: usize, plan: &Plan, ascii: bool) -> Result<Vec<u8>, Error> {
-    let mut sink = Sink::new(Vec::new(), false);
-    sink.append(b"ply\n")?;
+fn write_header(header: &Header, vertex: usize, steps: &[Step], ascii: bool, sink: &mut Sink) -> Result<(), Error> {
     let is_vertex = |kind| matches!(kind, LineKind::Element(owner) | LineKind::Property(owner, _) if owner == vertex);
     let last = header.lines.iter().rposition(|line| is_vertex(line.kind));
-    let property = |addition: usize| format!("property float {}\n", ADDED[addition]);
+    sink.append(b"ply\n")?;
     for (number, line) in header.lines.iter().enumerate() {
-        let action = match line.kind {
-            LineKind::Property(owner, property) if owner == vertex => plan.actions[property],
-            _ => Action::Keep,
+        let put = match line.kind {
+            LineKind::Property(owner, property) if owner == vertex => steps[property].put,
+            _ => Step::KEEP,
         };
-        match action {
-            Action::Keep if line.kind == LineKind::Format => {
-                let format = if ascii { Format::Ascii } else { Format::BinaryLittleEndian };
-                sink.append(format!("format {} 1.0\n", format.name()).as_bytes())?;
-            }
-            Action::Keep => sink.line(line.text)?,
-            Action::Drop => {}
-            Action::Replace(addition) => sink.append(property(addition).as_bytes())?,
+        if line.kind == LineKind::Format {
+            let format = if ascii { Format::Ascii } else { Format::BinaryLittleEndian };
+            sink.words(&[b"format", format.name().as_bytes(), b"1.0"])?;
+        } else if put == Step::KEEP {
+            sink.line(line.text)?;
         }
-        if Some(number) == last {
-            for addition in &plan.appended {
-                sink.append(property(*addition).as_bytes())?;
-            }
+        let added = steps.iter().filter(|step| step.kind.is_none() && Some(number) == last).map(|step| step.put);
+        for put in [put].into_iter().chain(added).filter(|put| *put < Step::KEEP) {
+            sink.words(&[b"property float", ADDED[put].as_bytes()])?;
         }
     }
-    sink.append(b"end_header\n")?;
-    Ok(sink.bytes)
+    sink.append(b"end_header\n")
 }
 
-/// One step in making a row of bytes.
-enum Move {
-    Copy { from: usize, length: usize },
-    Add(usize),
+/// Writes the rows of one element.
+struct Writer<'a> {
+    element: &'a Element<'a>,
+    steps: &'a [Step],
+    add: &'a Additions<'a>,
+    /// Whether all properties stay as they are.
+    kept: bool,
 }
 
-/// Little-endian rows of one length, to the same: whole runs of bytes, in parallel.
-fn copy_fixed(
-    rows: &[u8],
-    stride: usize,
-    vertex: &Element,
-    plan: &Plan,
-    add: &Additions,
-    sink: &mut Sink,
-    meter: &mut Meter,
-) -> Result<(), Error> {
-    let mut moves = Vec::new();
-    let mut from = 0;
-    for (property, action) in vertex.properties.iter().zip(&plan.actions) {
-        let size = property.kind.fixed_size().unwrap_or_default();
-        match (action, moves.last_mut()) {
-            (Action::Keep, Some(Move::Copy { from: start, length })) if *start + *length == from => *length += size,
-            (Action::Keep, _) => moves.push(Move::Copy { from, length: size }),
-            (Action::Drop, _) => {}
-            (Action::Replace(addition), _) => moves.push(Move::Add(*addition)),
+impl Writer<'_> {
+    /// Little-endian rows of one length, to the same: runs of bytes.
+    fn copy(&self, parts: &[Part], stride: usize, sink: &mut Sink, stage: &Stage) -> Result<(), Error> {
+        // Bytes to copy from a place in the row, or a number to add.
+        let mut moves: Vec<(usize, usize, usize)> = Vec::new();
+        let (mut from, mut out_stride) = (0, 0);
+        for step in self.steps {
+            let size = match step.kind {
+                Some(Kind::Scalar(scalar)) => scalar.size(),
+                _ => 0,
+            };
+            let length = if step.put == Step::KEEP { size } else { 4 };
+            match moves.last_mut() {
+                _ if step.put == Step::DROP => {}
+                Some((Step::KEEP, start, run)) if step.put == Step::KEEP && *start + *run == from => *run += length,
+                _ => moves.push((step.put, from, length)),
+            }
+            from += size;
+            out_stride += if step.put == Step::DROP { 0 } else { length };
         }
-        from += size;
-    }
-    moves.extend(plan.appended.iter().map(|addition| Move::Add(*addition)));
-    let size = |step: &Move| {
-        if let Move::Copy { length, .. } = step { *length } else { 4 }
-    };
-    let out_stride: usize = moves.iter().map(size).sum();
-
-    let start = sink.bytes.len();
-    // Fits: room for it was made before.
-    sink.bytes.resize(start + rows.len() / stride * out_stride, 0);
-    let sources = rows.chunks(stride.saturating_mul(TASK));
-    let targets = sink.bytes[start..].chunks_mut(out_stride.saturating_mul(TASK));
-    let work = |(task, (source, target)): (usize, (&[u8], &mut [u8]))| {
-        let pairs = source.chunks_exact(stride).zip(target.chunks_exact_mut(out_stride));
-        for (row, (source, mut target)) in pairs.enumerate() {
-            for step in &moves {
-                let (place, rest) = target.split_at_mut(size(step));
-                match step {
-                    Move::Copy { from, length } => place.copy_from_slice(&source[*from..*from + *length]),
-                    Move::Add(addition) => {
-                        place.copy_from_slice(&add.value(*addition, task * TASK + row).to_le_bytes());
+        let count: usize = parts.iter().map(|part| part.count).sum();
+        let start = sink.bytes.len();
+        // Fits: room for it was made before.
+        sink.bytes.resize(start + count * out_stride, 0);
+        let out = Scatter::new(&mut sink.bytes[start..]);
+        tasks::run(stage, parts.len(), &|i| {
+            let part = &parts[i];
+            // SAFETY: parts share no row.
+            let out = unsafe { out.slice(part.first * out_stride..(part.first + part.count) * out_stride) };
+            let rows = part.rows(stride).chunks_exact(stride).zip(out.chunks_exact_mut(out_stride));
+            for ((source, mut target), point) in rows.zip(part.first..) {
+                for (put, from, length) in &moves {
+                    let (place, rest) = target.split_at_mut(*length);
+                    if *put == Step::KEEP {
+                        place.copy_from_slice(&source[*from..*from + *length]);
+                    } else {
+                        place.copy_from_slice(&self.add.value(*put, point).to_le_bytes());
                     }
+                    target = rest;
                 }
-                target = rest;
+            }
+            Ok(())
+        })
+    }
+
+    /// Any rows to any format, value by value.
+    fn translate(&self, parts: &[Part], sink: &mut Sink, stage: &Stage) -> Result<(), Error> {
+        let mut done = 0;
+        for wave in parts.chunks(tasks::wave()) {
+            let stage = stage.part(done as f64 / parts.len() as f64..(done + wave.len()) as f64 / parts.len() as f64);
+            done += wave.len();
+            let outputs: Vec<Mutex<Vec<u8>>> = wave.iter().map(|_| Mutex::default()).collect();
+            tasks::run(&stage, wave.len(), &|i| {
+                let mut output = Sink::new(sink.text);
+                self.translate_part(&wave[i], &mut output)?;
+                *outputs[i].lock().unwrap_or_else(PoisonError::into_inner) = output.bytes;
+                Ok(())
+            })?;
+            for output in outputs {
+                sink.append(&output.into_inner().unwrap_or_else(PoisonError::into_inner))?;
             }
         }
-        Ok(source.len() / stride)
-    };
-    in_waves(sources.zip(targets).enumerate().collect(), work, |rows| meter.add(rows))
-}
-
-/// Some rows of an element.
-enum Source<'a> {
-    Binary {
-        rows: &'a [u8],
-        first: usize,
-        count: usize,
-        big_endian: bool,
-    },
-    /// With `whole`, rows are copied as they stand, whatever they hold.
-    Text {
-        part: Part<'a>,
-        whole: bool,
-    },
-}
-
-/// Any rows to any format, value by value.
-fn translate(
-    sources: Vec<Source>,
-    element: &Element,
-    plan: &Plan,
-    add: &Additions,
-    sink: &mut Sink,
-    meter: &mut Meter,
-) -> Result<(), Error> {
-    let text = sink.is_text();
-    if let [source] = &sources[..] {
-        let rows = source.translate(element, plan, add, sink)?;
-        return meter.add(rows);
+        Ok(())
     }
-    let work = |source: Source| {
-        let mut sink = Sink::new(Vec::new(), text);
-        let rows = source.translate(element, plan, add, &mut sink)?;
-        Ok((rows, sink.bytes))
-    };
-    in_waves(sources, work, |(rows, bytes)| {
-        sink.append(&bytes)?;
-        meter.add(rows)
-    })
-}
 
-impl Source<'_> {
-    /// Returns the number of rows.
-    fn translate(&self, element: &Element, plan: &Plan, add: &Additions, sink: &mut Sink) -> Result<usize, Error> {
-        match self {
-            Self::Binary { rows, first, count, big_endian } => {
-                let mut at = 0;
-                for row in *first..first + count {
-                    let mut outcome = Ok(());
-                    at = binary::visit_row(&element.properties, rows, at, *big_endian, |index, bytes| {
-                        if outcome.is_ok() {
-                            outcome = match plan.actions[index] {
-                                Action::Keep => {
-                                    translate_bytes(element.properties[index].kind, bytes, *big_endian, sink)
-                                }
-                                Action::Drop => Ok(()),
-                                Action::Replace(addition) => sink.float(add.value(addition, row)),
-                            };
-                        }
-                    })
-                    .map_err(|fault| fault.error(element, row as u64, at))?;
-                    outcome?;
-                    plan.appended.iter().try_for_each(|addition| sink.float(add.value(*addition, row)))?;
-                    sink.end_row();
-                }
-                Ok(*count)
+    fn translate_part(&self, part: &Part, sink: &mut Sink) -> Result<(), Error> {
+        let mut cursor = part.cursor();
+        for point in part.first..part.first + part.count {
+            cursor.next_row();
+            if self.kept && sink.text && cursor.is_text() {
+                // Whatever it holds.
+                sink.line(cursor.whole_line())?;
+                continue;
             }
-            Self::Text { part, whole } => {
-                let mut cursor = part.cursor();
-                for row in part.first as usize..part.first as usize + part.count {
-                    cursor.next_row();
-                    if *whole {
-                        sink.line(cursor.whole_row())?;
-                        continue;
-                    }
-                    for (property, action) in element.properties.iter().zip(&plan.actions) {
-                        match action {
-                            Action::Keep => translate_text(&mut cursor, property.kind, element, sink)?,
-                            Action::Drop => cursor.skip_property(property.kind, element)?,
-                            Action::Replace(addition) => {
-                                cursor.skip_property(property.kind, element)?;
-                                sink.float(add.value(*addition, row))?;
-                            }
-                        }
-                    }
-                    cursor.end_row(element)?;
-                    plan.appended.iter().try_for_each(|addition| sink.float(add.value(*addition, row)))?;
-                    sink.end_row();
+            for step in self.steps {
+                match step.kind {
+                    Some(kind) if step.put == Step::KEEP => self.translate_property(&mut cursor, kind, sink)?,
+                    Some(kind) => cursor.skip(kind, self.element)?,
+                    None => {}
                 }
-                Ok(part.count)
+                if step.put < Step::KEEP {
+                    sink.float(self.add.value(step.put, point))?;
+                }
             }
+            cursor.end_row(self.element)?;
+            sink.end_row();
         }
+        Ok(())
     }
-}
 
-fn translate_bytes(kind: Kind, bytes: &[u8], big_endian: bool, sink: &mut Sink) -> Result<(), Error> {
-    match kind {
-        Kind::Scalar(scalar) => sink.value(scalar, bits(bytes, big_endian)),
-        Kind::List { count, item } => {
-            let (length, items) = bytes.split_at(count.size().min(bytes.len()));
-            sink.value(count, bits(length, big_endian))?;
-            items.chunks_exact(item.size()).try_for_each(|bytes| sink.value(item, bits(bytes, big_endian)))
-        }
-    }
-}
-
-fn translate_text(cursor: &mut Cursor, kind: Kind, element: &Element, sink: &mut Sink) -> Result<(), Error> {
-    let mut next = |cursor: &mut Cursor, scalar: Scalar| {
-        let Some(token) = cursor.token() else {
-            return Err(cursor.complain(element));
+    fn translate_property(&self, cursor: &mut Cursor, kind: Kind, sink: &mut Sink) -> Result<(), Error> {
+        let (mut scalar, mut more) = match kind {
+            Kind::Scalar(scalar) => (scalar, None),
+            Kind::List { count, item } => {
+                let length = cursor.clone().length(count, item, self.element)?;
+                (count, Some((length, item)))
+            }
         };
-        if sink.is_text() {
-            return sink.token(token);
+        loop {
+            self.translate_value(cursor, scalar, sink)?;
+            match &mut more {
+                Some((left, item)) if *left > 0 => {
+                    *left -= 1;
+                    scalar = *item;
+                }
+                _ => return Ok(()),
+            }
         }
-        let Some(bits) = token_bits(token, scalar) else {
-            let text = super::header::shorten(token);
-            return Err(cursor.error(format!(
-                "'{text}' is no value of type {}; the output can keep it only as ASCII",
-                scalar.name()
-            )));
-        };
-        sink.value(scalar, bits)
-    };
-    match kind {
-        Kind::Scalar(scalar) => next(cursor, scalar),
-        Kind::List { count, item } => {
-            let length = cursor.clone().list_length(count, element)?;
-            next(cursor, count)?;
-            (0..length).try_for_each(|_| next(cursor, item))
+    }
+
+    fn translate_value(&self, cursor: &mut Cursor, scalar: Scalar, sink: &mut Sink) -> Result<(), Error> {
+        let value = cursor.take(scalar, self.element)?;
+        if sink.text && cursor.is_text() {
+            sink.append(value)?;
+            return sink.append(b" ");
         }
+        sink.value(scalar, cursor.bits(value, scalar)?)
     }
 }

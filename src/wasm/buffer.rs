@@ -29,7 +29,8 @@ impl Buffer {
     #[wasm_bindgen(constructor)]
     pub fn new(byte_length: f64) -> Result<Buffer, JsValue> {
         if !(byte_length >= 0.0 && byte_length.fract() == 0.0 && byte_length <= u64::MAX as f64) {
-            let message = format!("byteLength is {byte_length}; wanted a whole number of at least 0");
+            let message =
+                format!("byteLength is {}; wanted a whole number of at least 0", crate::number::text(byte_length));
             return Err(Error::Input(message).into());
         }
         let too_large = Error::memory("the data", byte_length as u64);

@@ -110,7 +110,7 @@ fn describe(value: &JsValue) -> String {
     const LONGEST: usize = 60;
     let text = match (value.as_string(), value.as_f64()) {
         (Some(text), _) => format!("'{text}'"),
-        (_, Some(number)) => number.to_string(),
+        (_, Some(number)) => crate::number::text(number),
         _ => match JSON::stringify(value) {
             Ok(text) if text.is_string() => text.into(),
             _ => value.js_typeof().as_string().unwrap_or_default(),

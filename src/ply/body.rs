@@ -1,0 +1,212 @@
+//! Where the rows of each element are, in parts that can be read in parallel.
+//!
+//! All the header declares is checked here against the bytes that are there, before memory is taken for it.
+//!
+//! Text is cut into pieces at line ends. A first pass counts the rows and lines of every piece, so that every row knows
+//! its number and every error its line.
+
+use super::cursor::Cursor;
+use super::header::{Element, Header};
+use crate::error::{Error, Place};
+use crate::parallel::{self, Scatter};
+
+/// Rows of a part, where rows can be told apart without reading them.
+const TASK: u64 = 1 << 16;
+/// Bytes of a piece of text: small enough to share among threads, large enough that the table of pieces is nothing.
+const PIECE: usize = 256 << 10;
+
+/// The rows of a file.
+pub(super) struct Body<'a> {
+    header: &'a Header<'a>,
+    file: &'a [u8],
+    /// Where each element begins, and the last one ends: its row among all rows of text, or its byte in the file.
+    starts: Vec<u64>,
+    /// Of text.
+    pieces: Vec<Piece<'a>>,
+}
+
+struct Piece<'a> {
+    cursor: Cursor<'a>,
+    /// The number of the first row in the whole body.
+    first: u64,
+    rows: u64,
+}
+
+/// Some rows of one element.
+pub(super) struct Part<'a> {
+    start: Cursor<'a>,
+    /// The rows to pass over first.
+    skip: u64,
+    /// The number of the first row within its element.
+    pub first: usize,
+    pub count: usize,
+}
+
+impl<'a> Part<'a> {
+    /// A cursor before the part's first row.
+    pub fn cursor(&self) -> Cursor<'a> {
+        let mut cursor = self.start.clone();
+        for _ in 0..self.skip {
+            cursor.next_row();
+            cursor.skip_line();
+        }
+        cursor
+    }
+
+    /// The rows of a binary element without lists, of so many bytes each.
+    pub fn rows(&self, stride: usize) -> &'a [u8] {
+        &self.start.bytes[self.start.at..self.start.at + self.count * stride]
+    }
+}
+
+impl<'a> Body<'a> {
+    /// Finds the elements. Costs one step for an element of fixed rows, one for every list in the others, and a pass over
+    /// text; takes no memory for rows.
+    pub fn locate(header: &'a Header<'a>, file: &'a [u8]) -> Result<Self, Error> {
+        let mut body = Self { header, file, starts: Vec::new(), pieces: Vec::new() };
+        if Cursor::new(file, 0, header.format).is_text() {
+            body.index_text()?;
+            return Ok(body);
+        }
+        let mut at = header.body;
+        for element in &header.elements {
+            body.starts.push(at as u64);
+            at = body.end(element, at)?;
+        }
+        Ok(body)
+    }
+
+    /// The end of a binary element.
+    fn end(&self, element: &Element, start: usize) -> Result<usize, Error> {
+        let there = self.file.len() - start;
+        let mut cursor = Cursor::new(self.file, start, self.header.format);
+        let ends = |rows: u64, at: usize| {
+            Error::format(
+                Some(Place::Byte(at as u64)),
+                format_args!("the file ends after {rows} of {} rows of element {}", element.count, element.label()),
+            )
+        };
+        match element.stride() {
+            Some(0) => {}
+            Some(stride) => {
+                let rows = (there / stride) as u64;
+                if rows < element.count {
+                    return Err(ends(rows, start + rows as usize * stride));
+                }
+                cursor.at += element.count as usize * stride;
+            }
+            // Rows with a list have at least the byte of its length, so the file bounds this loop, whatever the count.
+            None => {
+                for row in 0..element.count {
+                    cursor.next_row();
+                    let begin = cursor.at;
+                    if let Err(error) = cursor.skip_row(element) {
+                        return Err(if cursor.at > self.file.len() { ends(row, begin) } else { error });
+                    }
+                }
+            }
+        }
+        Ok(cursor.at)
+    }
+
+    /// Counts the rows of text and checks that there are enough.
+    fn index_text(&mut self) -> Result<(), Error> {
+        let Header { format, line_end, body, body_line, .. } = *self.header;
+        let mut rest = &self.file[body..];
+        while !rest.is_empty() {
+            let sure = rest.len().min(PIECE);
+            let more = rest[sure..].iter().position(|byte| *byte == line_end);
+            let (piece, after) = rest.split_at(more.map_or(rest.len(), |more| sure + more + 1));
+            let mut cursor = Cursor::new(piece, 0, format);
+            cursor.line_end = line_end;
+            self.pieces.push(Piece { cursor, first: 0, rows: 0 });
+            rest = after;
+        }
+        let count = self.pieces.len();
+        let pieces = Scatter::new(&mut self.pieces);
+        parallel::each(count, &|i| {
+            // SAFETY: each number comes once, so this piece is this call's alone.
+            let piece = &mut unsafe { pieces.slice(i..i + 1) }[0];
+            let mut cursor = piece.cursor.clone();
+            while cursor.next_row() {
+                piece.rows += 1;
+                cursor.skip_line();
+            }
+            piece.cursor.line = cursor.line;
+        });
+        let (mut rows, mut line) = (0, body_line);
+        for piece in &mut self.pieces {
+            piece.first = rows;
+            rows += piece.rows;
+            line += std::mem::replace(&mut piece.cursor.line, line);
+        }
+
+        let (mut start, mut values) = (0, 0.0);
+        for element in &self.header.elements {
+            self.starts.push(start);
+            // Rows without values leave no line.
+            if element.properties.is_empty() {
+                continue;
+            }
+            let there = rows - start;
+            if there < element.count {
+                return Err(Error::format(
+                    Some(Place::Line(line)),
+                    format_args!(
+                        "the file ends after {there} of {} rows of element {}",
+                        element.count,
+                        element.label()
+                    ),
+                ));
+            }
+            start += element.count;
+            values += element.count as f64 * element.properties.len() as f64;
+        }
+        // Rows of too few values are found later, with their line; this only keeps them from costing much memory.
+        const FEW: f64 = 1e6;
+        let bytes = self.file.len() - body;
+        if values > FEW && values * 2.0 > bytes as f64 + 1.0 {
+            let values = values as u64;
+            return Err(Error::format(
+                Some(Place::Line(body_line)),
+                format_args!("{bytes} bytes of text cannot hold the {values} values that the header declares"),
+            ));
+        }
+        Ok(())
+    }
+
+    /// The rows of an element, in their order; none if they have no properties.
+    pub fn parts(&self, index: usize) -> Vec<Part<'a>> {
+        let element = &self.header.elements[index];
+        let start = self.starts[index];
+        let mut parts = Vec::new();
+        if element.properties.is_empty() {
+            return parts;
+        }
+        for piece in &self.pieces {
+            let first = piece.first.max(start);
+            let end = (piece.first + piece.rows).min(start + element.count);
+            if first < end {
+                parts.push(Part {
+                    start: piece.cursor.clone(),
+                    skip: first - piece.first,
+                    first: (first - start) as usize,
+                    count: (end - first) as usize,
+                });
+            }
+        }
+        if self.header.format == super::Format::Ascii {
+            return parts;
+        }
+        let (task, stride) = element.stride().map_or((element.count, 0), |stride| (TASK, stride));
+        let mut first = 0;
+        while first < element.count {
+            let count = task.min(element.count - first) as usize;
+            let first_row = first as usize;
+            let start = Cursor::new(self.file, start as usize + first_row * stride, self.header.format);
+            parts.push(Part { start, skip: 0, first: first_row, count });
+            first += task;
+        }
+        parts
+    }
+}
