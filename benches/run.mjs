@@ -70,11 +70,9 @@ function engines(node, page) {
       { file: cloud.file, cell: option(cell), runs, threads },
     );
   const counts = THREADS > 1 ? [1, THREADS] : [1];
-  return [
-    ['native', native],
-    ['wasm, Node', inNode],
-    ...(page ? [['wasm, Chromium', inPage]] : []),
-  ].flatMap(([name, engine]) => counts.map((threads) => ({ name, threads, measure: engine(threads) })));
+  return [['native', native], ['wasm, Node', inNode], ...(page ? [['wasm, Chromium', inPage]] : [])].flatMap(
+    ([name, engine]) => counts.map((threads) => ({ name, threads, measure: engine(threads) })),
+  );
 }
 
 async function openPage() {
@@ -114,14 +112,17 @@ function row(cloud, cell, engine, reports) {
 await main(async () => {
   const { values } = parseArgs({ options: { scan: { type: 'string' }, runs: { type: 'string', default: '5' } } });
   const runs = Number(values.runs);
-  if (!(Number.isInteger(runs) && runs > 0)) throw new Failure(`--runs is ${values.runs}; wanted a whole number above 0`);
+  if (!(Number.isInteger(runs) && runs > 0))
+    throw new Failure(`--runs is ${values.runs}; wanted a whole number above 0`);
   setup();
   build();
   const node = await import('../dist/node.js');
   const { page, close } = await openPage();
   mkdirSync(join(root, FOLDER), { recursive: true });
   try {
-    console.log(`${cpus()[0].model.trim()}, ${THREADS} threads, Node ${process.versions.node}; medians of ${runs} runs\n`);
+    console.log(
+      `${cpus()[0].model.trim()}, ${THREADS} threads, Node ${process.versions.node}; medians of ${runs} runs\n`,
+    );
     const head = ['cloud', 'cell', 'engine', 'threads', 'total ms', 'spread', ...PHASES, 'M points/s', 'bytes/point'];
     console.log(`| ${head.join(' | ')} |\n|${head.map(() => ' --- |').join('')}`);
     for (const [i, cloud] of (await clouds(values.scan, node.readPointCloud)).entries()) {

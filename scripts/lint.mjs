@@ -23,7 +23,7 @@ const checks = {
       ...wasm,
     ),
   'JavaScript, TypeScript and CSS are formatted': () =>
-    run('prettier', ['--check', 'src/js', 'www', 'tests/node', 'tests/browser', 'scripts/*.mjs', '!www/dist']),
+    run('prettier', ['--check', 'src/js', 'www', 'tests/node', 'tests/browser', 'scripts', 'benches', '!www/dist']),
   'types of the package': () => run('tsc', ['--noEmit', '--project', '.']),
   'types of the page': () => run('tsc', ['--noEmit', '--project', 'www']),
 };

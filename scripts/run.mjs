@@ -39,13 +39,14 @@ export class Failure extends Error {}
 
 export const tell = (text) => process.stderr.write(`${text}\n`);
 
-/** Runs a command to its end and shows what it says. Throws a `Failure` if it fails. */
-export function run(command, args, { env = {}, quiet = false } = {}) {
+/** Runs a command to its end and shows what it says. Throws a `Failure` if it fails or takes more than `minutes`. */
+export function run(command, args, { env = {}, quiet = false, minutes } = {}) {
   const { error, status, signal, stdout, stderr } = spawnSync(command, args, {
     cwd: root,
     env: { ...environment, ...env },
     stdio: quiet ? ['ignore', 'pipe', 'pipe'] : ['ignore', process.stderr.fd, process.stderr.fd],
     maxBuffer: 1 << 28,
+    timeout: minutes && minutes * 60_000,
   });
   if (!error && status === 0) return;
   if (quiet) process.stderr.write(Buffer.concat([stdout ?? Buffer.alloc(0), stderr ?? Buffer.alloc(0)]));

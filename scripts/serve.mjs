@@ -1,6 +1,6 @@
 // A small static file server on this machine only, for the page and for the browser tests.
 
-import { createReadStream } from 'node:fs';
+import { createReadStream, readFileSync } from 'node:fs';
 import { stat } from 'node:fs/promises';
 import { createServer } from 'node:http';
 import { extname, join, normalize, sep } from 'node:path';
@@ -28,6 +28,15 @@ export const ISOLATION = {
   'Cross-Origin-Opener-Policy': 'same-origin',
   'Cross-Origin-Embedder-Policy': 'require-corp',
 };
+
+/**
+ * The headers that the page in a folder wants: isolation, and its own Content-Security-Policy, which as a <meta> holds
+ * for the page but not for its workers.
+ */
+export function pageHeaders(folder) {
+  const [, policy] = readFileSync(join(folder, 'index.html'), 'utf8').match(/content="(default-src[^"]*)"/);
+  return { ...ISOLATION, 'Content-Security-Policy': policy };
+}
 
 /**
  * Serves a folder on 127.0.0.1 until `close()` is called, with `headers` on every answer.

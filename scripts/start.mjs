@@ -3,7 +3,7 @@
 import { join } from 'node:path';
 import { build, buildPage } from './build.mjs';
 import { Failure, main, root } from './run.mjs';
-import { serve } from './serve.mjs';
+import { pageHeaders, serve } from './serve.mjs';
 import { setup } from './setup.mjs';
 
 const FIRST_PORT = 8080;
@@ -14,9 +14,10 @@ await main(async () => {
   buildPage();
   const wanted = process.env.PORT;
   if (wanted && !/^\d{1,5}$/.test(wanted)) throw new Failure(`PORT is ${wanted}; wanted a number from 0 to 65535`);
-  const options = wanted ? { port: Number(wanted) } : { port: FIRST_PORT, next: true };
-  const { url } = await serve(join(root, 'www', 'dist'), options).catch((error) => {
-    throw new Failure(`no server on port ${options.port}: ${error.message}`);
+  const { port, next } = wanted ? { port: Number(wanted) } : { port: FIRST_PORT, next: true };
+  const folder = join(root, 'www', 'dist');
+  const { url } = await serve(folder, { port, next, headers: pageHeaders(folder) }).catch((error) => {
+    throw new Failure(`no server on port ${port}: ${error.message}`);
   });
   console.log(`\nbilinormal: ${url}?sample (end with Ctrl-C)`);
 });

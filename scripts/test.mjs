@@ -11,6 +11,8 @@ function nodeTests(folder, options = []) {
   const files = readdirSync(join(root, folder)).filter((name) => /\.test\.(js|mjs)$/.test(name));
   run(process.execPath, ['--test', ...options, ...files.sort().map((name) => join(folder, name))], {
     env: { CHROME: findBrowser() },
+    // Only a test that hangs comes near it.
+    minutes: 15,
   });
 }
 

@@ -33,9 +33,9 @@ impl Bricks {
     /// Finds the bricks of all points, and for each point the number of its brick. Two passes, parallel.
     pub fn find(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
         let size = lattice.bricks();
-        let volume = size.x as u128 * size.y as u128 * size.z as u128;
+        let volume = size.as_dvec3().element_product();
         // At most 3 bytes a point. A surface with a few points in a cube needs a tenth of that.
-        let limit = (16 * points.len() as u128).clamp(1 << 20, 1 << 31);
+        let limit = (16.0 * points.len() as f64).clamp(1e6, 2e9);
         if volume <= limit {
             Self::in_box(points, lattice, size, stage)
         } else {

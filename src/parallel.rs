@@ -80,6 +80,7 @@ unsafe impl<T: Send> Sync for Filling<T> {}
 
 impl<T: Copy> Filling<T> {
     /// Takes the memory, or says how much was needed.
+    #[inline(never)]
     pub fn new(length: usize, what: &str) -> Result<Self, Error> {
         let mut items = Vec::new();
         reserve(&mut items, length, what)?;

@@ -10,7 +10,7 @@ use common::*;
 #[test]
 fn spheres_of_the_paper() {
     let mut previous = 0.0033;
-    for count in [187_500, 375_000, 750_000] {
+    for count in [187_500, 375_000, 750_000, 1_500_000, 3_000_000] {
         let cloud = sphere(count, 1);
         let result = run(&cloud.points, Cell::Scale(1.0));
         let angles = angles(&result.normals, &cloud.normals);
@@ -20,6 +20,11 @@ fn spheres_of_the_paper() {
         assert!(worst(&angles) < 2.0, "{count} points: worst angle {}", worst(&angles));
         previous = mean;
         let report = result.report;
+        println!(
+            "{count} points: mean deviation {mean:.5}, worst {:.2} degrees, nodes {:?}",
+            worst(&angles),
+            report.nodes_used
+        );
         assert_eq!(report.nodes_used.iter().sum::<u64>(), count as u64);
         assert!(report.nodes_used[4] > 75 * count as u64 / 100, "{:?}", report.nodes_used);
         assert_eq!(report.unresolved, 0);

@@ -73,6 +73,7 @@ impl<'a> Body<'a> {
             body.starts.push(at as u64);
             at = body.end(element, at)?;
         }
+        body.starts.push(at as u64);
         Ok(body)
     }
 
@@ -173,6 +174,11 @@ impl<'a> Body<'a> {
             ));
         }
         Ok(())
+    }
+
+    /// All rows of a binary element.
+    pub fn bytes(&self, index: usize) -> &'a [u8] {
+        &self.file[self.starts[index] as usize..self.starts[index + 1] as usize]
     }
 
     /// The rows of an element, in their order; none if they have no properties.

@@ -52,12 +52,11 @@ pub fn write(file: &[u8], add: &Additions, ascii: bool, progress: &Progress) -> 
         done += rows;
         let steps = if number == index { &steps } else { &plan(element, None) };
         let writer = Writer { element, steps, add, kept: number != index };
-        let parts = body.parts(number);
+        let same = header.format == Format::BinaryLittleEndian && !ascii;
         match element.stride() {
-            Some(stride) if header.format == Format::BinaryLittleEndian && !ascii => {
-                writer.copy(&parts, stride, &mut sink, &stage)?;
-            }
-            _ => writer.translate(&parts, &mut sink, &stage)?,
+            _ if same && number != index => sink.append(body.bytes(number))?,
+            Some(stride) if same => writer.copy(&body.parts(number), stride, &mut sink, &stage)?,
+            _ => writer.translate(&body.parts(number), &mut sink, &stage)?,
         }
     }
     progress.update("write", 1.0)?;

@@ -18,7 +18,7 @@ pub(super) fn parse(value: &JsValue) -> Result<Options, Error> {
         return Ok(options);
     }
     if !value.is_object() {
-        return refuse("options", value, "an object");
+        return Err(refusal("options", value, "an object"));
     }
     for name in Object::keys(value.unchecked_ref::<Object>()).iter().filter_map(|name| name.as_string()) {
         if !NAMES.contains(&name.as_str()) {
@@ -26,100 +26,93 @@ pub(super) fn parse(value: &JsValue) -> Result<Options, Error> {
         }
     }
     if let Some(method) = given(value, "method") {
-        options.method = self::method(&method)?;
+        options.method = self::method(&method).ok_or_else(|| refusal("method", &method, METHODS))?;
     }
     if let Some(cell) = given(value, "cell") {
-        options.cell = self::cell(&cell)?;
+        options.cell = self::cell(&cell).ok_or_else(|| refusal("cell", &cell, CELLS))?;
     }
     if let Some(k) = given(value, "k") {
-        options.k = Some(self::k(&k)?);
+        options.k = Some(self::k(&k).ok_or_else(|| refusal("k", &k, "a whole number of at least 1"))?);
     }
     if let Some(orient) = given(value, "orient") {
-        options.orient = self::orient(&orient)?;
+        options.orient = self::orient(&orient).ok_or_else(|| refusal("orient", &orient, ORIENTS))?;
     }
     if let Some(curvature) = given(value, "curvature") {
-        options.curvature = curvature.as_bool().map_or_else(|| refuse("curvature", &curvature, "true or false"), Ok)?;
+        options.curvature = curvature.as_bool().ok_or_else(|| refusal("curvature", &curvature, "true or false"))?;
     }
     Ok(options)
 }
 
-fn method(value: &JsValue) -> Result<Method, Error> {
-    match value.as_string().as_deref() {
-        Some("bilinear") => Ok(Method::Bilinear),
-        Some("knn") => Ok(Method::Knn),
-        Some("egg") => Ok(Method::Egg),
-        _ => refuse("method", value, METHODS),
+fn method(value: &JsValue) -> Option<Method> {
+    match value.as_string()?.as_str() {
+        "bilinear" => Some(Method::Bilinear),
+        "knn" => Some(Method::Knn),
+        "egg" => Some(Method::Egg),
+        _ => None,
     }
 }
 
-fn cell(value: &JsValue) -> Result<Cell, Error> {
-    if value.as_string().as_deref() == Some("auto") {
-        return Ok(Cell::Auto);
+fn cell(value: &JsValue) -> Option<Cell> {
+    if let Some(word) = value.as_string() {
+        return (word == "auto").then_some(Cell::Auto);
     }
-    let number = |name, value: &JsValue| value.as_f64().map_or_else(|| refuse(name, value, "a number"), Ok);
-    match only_entry(value) {
-        Some((name, scale)) if name == "scale" => Ok(Cell::Scale(number("cell.scale", &scale)?)),
-        Some((name, size)) if name == "size" => Ok(Cell::Size(number("cell.size", &size)?)),
-        _ => refuse("cell", value, CELLS),
-    }
-}
-
-fn k(value: &JsValue) -> Result<u32, Error> {
-    match value.as_f64() {
-        Some(k) if k.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&k) => Ok(k as u32),
-        _ => refuse("k", value, "a whole number of at least 1"),
+    let (name, number) = only_entry(value)?;
+    match name.as_str() {
+        "scale" => Some(Cell::Scale(number.as_f64()?)),
+        "size" => Some(Cell::Size(number.as_f64()?)),
+        _ => None,
     }
 }
 
-fn orient(value: &JsValue) -> Result<Orient, Error> {
-    match value.as_string().as_deref() {
-        Some("none") => return Ok(Orient::None),
-        Some("consistent") => return Ok(Orient::Consistent),
-        Some("outward") => return Ok(Orient::Outward),
-        _ => {}
+fn k(value: &JsValue) -> Option<u32> {
+    value.as_f64().filter(|k| *k >= 1.0 && f64::from(*k as u32) == *k).map(|k| k as u32)
+}
+
+fn orient(value: &JsValue) -> Option<Orient> {
+    if let Some(word) = value.as_string() {
+        return match word.as_str() {
+            "none" => Some(Orient::None),
+            "consistent" => Some(Orient::Consistent),
+            "outward" => Some(Orient::Outward),
+            _ => None,
+        };
     }
-    match only_entry(value) {
-        Some((name, position)) if name == "viewpoint" => Ok(Orient::Viewpoint(vector("orient.viewpoint", &position)?)),
-        Some((name, direction)) if name == "up" => Ok(Orient::Up(vector("orient.up", &direction)?)),
-        _ => refuse("orient", value, ORIENTS),
+    let (name, vector) = only_entry(value)?;
+    match name.as_str() {
+        "viewpoint" => Some(Orient::Viewpoint(three(&vector)?)),
+        "up" => Some(Orient::Up(three(&vector)?)),
+        _ => None,
     }
 }
 
 /// Three finite numbers, in an array or a typed array.
-fn vector(name: &str, value: &JsValue) -> Result<[f64; 3], Error> {
-    let wanted = || refuse(name, value, "three finite numbers [x, y, z]");
-    if !value.is_object() || property(value, "length").as_f64() != Some(3.0) {
-        return wanted();
-    }
-    let mut vector = [0.0; 3];
-    for (item, name) in vector.iter_mut().zip(["0", "1", "2"]) {
-        match property(value, name).as_f64() {
-            Some(number) if number.is_finite() => *item = number,
-            _ => return wanted(),
-        }
-    }
-    Ok(vector)
+fn three(value: &JsValue) -> Option<[f64; 3]> {
+    let number = |name| property(value, name).as_f64().filter(|number| number.is_finite());
+    let numbers = [number("0")?, number("1")?, number("2")?];
+    (number("length") == Some(3.0)).then_some(numbers)
 }
 
-fn refuse<T>(name: &str, value: &JsValue, wanted: &str) -> Result<T, Error> {
-    Err(Error::Input(format!("{name} is {}; wanted {wanted}", describe(value))))
+#[cold]
+fn refusal(name: &str, value: &JsValue, wanted: &str) -> Error {
+    Error::Input(format!("{name} is {}; wanted {wanted}", describe(value)))
 }
 
 /// A value as its author wrote it, as far as JSON can tell, and not more than a line of it.
 fn describe(value: &JsValue) -> String {
     const LONGEST: usize = 60;
-    let text = match (value.as_string(), value.as_f64()) {
-        (Some(text), _) => format!("'{text}'"),
-        (_, Some(number)) => crate::number::text(number),
-        _ => match JSON::stringify(value) {
-            Ok(text) if text.is_string() => text.into(),
+    let mut text = match value.as_string() {
+        Some(text) => format!("'{text}'"),
+        None => match JSON::stringify(value) {
+            // Not a number and the infinities are null in JSON.
+            Ok(json) if json.is_string() && value.as_f64().is_none_or(f64::is_finite) => json.into(),
             _ => value.js_typeof().as_string().unwrap_or_default(),
         },
     };
-    match text.char_indices().nth(LONGEST) {
-        Some((end, _)) => format!("{}...", &text[..end]),
-        None => text,
+    if let Some((end, _)) = text.char_indices().nth(LONGEST) {
+        text.truncate(end);
+        text.push_str("...");
     }
+    text
 }
 
 /// The name and value of an object's only property.
@@ -137,7 +130,7 @@ fn given(object: &JsValue, name: &str) -> Option<JsValue> {
     Some(property(object, name)).filter(|value| !value.is_undefined())
 }
 
-/// A property that cannot be read, because its getter throws, counts as missing.
+/// A property that cannot be read, because its getter throws, or because it is none of an object, counts as missing.
 fn property(object: &JsValue, name: &str) -> JsValue {
     Reflect::get(object, &name.into()).unwrap_or(JsValue::UNDEFINED)
 }

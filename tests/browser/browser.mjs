@@ -4,7 +4,7 @@ import { mkdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { chromium } from 'playwright-core';
 import { root } from '../../scripts/run.mjs';
-import { ISOLATION, serve } from '../../scripts/serve.mjs';
+import { pageHeaders, serve } from '../../scripts/serve.mjs';
 import { findBrowser } from '../../scripts/setup.mjs';
 
 /** For people to look at; not in git. */
@@ -26,10 +26,9 @@ const QUIET = [
 export async function openBrowser() {
   mkdirSync(ARTEFACTS, { recursive: true });
   const dist = join(root, 'www', 'dist');
-  const [, policy] = readFileSync(join(dist, 'index.html'), 'utf8').match(/content="(default-src[^"]*)"/);
   const isolated = await serve(dist);
   const plain = await serve(join(root, 'www'), { headers: {} });
-  const guarded = await serve(dist, { headers: { ...ISOLATION, 'Content-Security-Policy': policy } });
+  const guarded = await serve(dist, { headers: pageHeaders(dist) });
   const browser = await chromium.launch({ executablePath: findBrowser(), args: QUIET });
   const surprises = [];
   return {

@@ -145,9 +145,9 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   /** Size of a point in world units, and larger where a part of the cloud has to stand for the whole. */
   function setSize(drawn: number): void {
     if (!cloud || !bounds) return;
-    // The surface of a scan has about as much area as the sphere round it; points without order need 1.8 times the
+    // The surface of a scan has about as much area as the sphere round it; points without order need 2.2 times the
     // spacing of an even pattern to close it.
-    const spacing = 1.8 * bounds.radius * Math.sqrt((4 * Math.PI) / Math.max(1, cloud.positions.length / 3));
+    const spacing = 2.2 * bounds.radius * Math.sqrt((4 * Math.PI) / Math.max(1, cloud.positions.length / 3));
     material.size = pointSize * spacing * Math.min(2, Math.sqrt(1 / drawn));
   }
 
