@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::options::Cell;
 use crate::parallel;
 use crate::points::{Bounds, Bulk, Points};
+use crate::power::{exp2, log2};
 use glam::{DVec3, UVec3};
 use std::sync::{Mutex, PoisonError};
 
@@ -33,7 +34,7 @@ pub(crate) fn paper_edge(extent: DVec3, count: usize) -> f64 {
     // Shares of the longest side, so that nothing over- or underflows.
     let (thin, middle) = (thin / long, middle / long);
     // By logarithms, which are needed below anyway: a cube root of its own is 2 KB of WebAssembly.
-    let cube_root = ((thin * middle / n).log2() / 3.0).exp2();
+    let cube_root = exp2(log2(thin * middle / n) / 3.0);
     let edge = long * cube_root.max((middle / n).sqrt()).max(1.0 / n);
     if edge > 0.0 && edge.is_finite() { edge } else { 1.0 }
 }
@@ -72,8 +73,8 @@ fn populated_edge(points: &Points, bounds: &Bounds) -> f64 {
         return probes.edge * (target / counts[0]).sqrt();
     }
     let (coarse, fine) = (counts[level - 1], counts[level]);
-    let share = (coarse / target).log2() / (coarse / fine).log2();
-    probes.edge * (-(level as f64 - 1.0 + share)).exp2()
+    let share = log2(coarse / target) / log2(coarse / fine);
+    probes.edge * exp2(1.0 - level as f64 - share)
 }
 
 /// Cubes of one grid that hold a chosen point each, with the number of chosen points in them.
@@ -96,7 +97,7 @@ impl Probes {
         let step = sample.len().div_ceil(PROBES).max(1);
         let mut probes = Self { origin: bulk.median, edge: extent, chosen: Vec::new(), filter: vec![0; 1024] };
         for halvings in 0..64 {
-            probes.edge = extent * (-f64::from(halvings)).exp2();
+            probes.edge = extent * exp2(-f64::from(halvings));
             let mut cubes: Vec<[i64; 3]> = sample.iter().step_by(step).map(|p| probes.cube(*p).0).collect();
             cubes.sort_unstable();
             probes.chosen = cubes.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as u32)).collect();

@@ -23,6 +23,7 @@ mod parallel;
 mod pca;
 pub mod ply;
 mod points;
+mod power;
 mod progress;
 #[cfg(target_arch = "wasm32")]
 pub mod wasm;

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::parallel;
+use crate::power::{exp2, log2};
 use bytemuck::cast_slice;
 use glam::{DVec3, Vec3};
 use std::borrow::Cow;
@@ -36,7 +37,7 @@ impl<'a> Points<'a> {
         let points: &[DVec3] = cast_slice(coordinates);
         let Bulk { median, extent, .. } = Bulk::of(points.len(), &|i| points[i]);
         // A power of two, so that scaling loses nothing.
-        let unit = if extent > 1e30 || (extent > 0.0 && extent < 1e-30) { extent.log2().round().exp2() } else { 1.0 };
+        let unit = if extent > 1e30 || (extent > 0.0 && extent < 1e-30) { exp2(log2(extent).round()) } else { 1.0 };
         let mut positions = Vec::new();
         reserve(&mut positions, points.len(), "the cloud")?;
         positions.extend(points.iter().map(|p| ((*p - median) / unit).as_vec3()));

@@ -51,29 +51,31 @@ pub fn write_cloud(cloud: &PointCloud, add: &Additions, ascii: bool) -> Result<V
     sink.append(b"end_header\n")?;
     sink.make_room(row * count)?;
 
-    let out = &mut sink.bytes;
-    let floats = |out: &mut Vec<u8>, values: Option<&[f32]>, width: usize, point: usize| {
-        for value in values.map_or(&[][..], |values| &values[width * point..width * (point + 1)]) {
-            out.extend_from_slice(&value.to_le_bytes());
-        }
-    };
     for point in 0..count {
-        if shifted {
-            for axis in 0..3 {
-                let value = cloud.origin[axis] + f64::from(cloud.positions[3 * point + axis]);
-                out.extend_from_slice(&value.to_le_bytes());
+        for axis in 0..3 {
+            let value = cloud.positions[3 * point + axis];
+            if shifted {
+                sink.append(&(cloud.origin[axis] + f64::from(value)).to_le_bytes())?;
+            } else {
+                sink.append(&value.to_le_bytes())?;
             }
-        } else {
-            floats(out, Some(&cloud.positions), 3, point);
         }
-        floats(out, normals, 3, point);
+        floats(&mut sink, normals, 3, point)?;
         if let Some(colors) = colors {
-            out.extend_from_slice(&colors[4 * point..4 * point + 4]);
+            sink.append(&colors[4 * point..4 * point + 4])?;
         }
-        floats(out, intensity, 1, point);
-        floats(out, add.curvature, 1, point);
+        floats(&mut sink, intensity, 1, point)?;
+        floats(&mut sink, add.curvature, 1, point)?;
     }
-    if ascii { write(out, &Additions::default(), true, &Progress::silent()) } else { Ok(sink.bytes) }
+    if ascii { write(&sink.bytes, &Additions::default(), true, &Progress::silent()) } else { Ok(sink.bytes) }
+}
+
+/// The numbers of a point, if there are any.
+fn floats(sink: &mut Sink, values: Option<&[f32]>, width: usize, point: usize) -> Result<(), Error> {
+    let Some(values) = values else {
+        return Ok(());
+    };
+    values[width * point..width * (point + 1)].iter().try_for_each(|value| sink.append(&value.to_le_bytes()))
 }
 
 fn check(length: usize, each: usize, count: usize, name: &str) -> Result<(), Error> {

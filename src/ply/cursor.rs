@@ -259,7 +259,7 @@ fn text_bits(token: &[u8], scalar: Scalar) -> Option<u64> {
     if scalar.is_integer()
         && let Some((negative, size)) = number::parse_whole(token)
     {
-        return scalar.from_whole(negative, size);
+        return scalar.hold(negative, size);
     }
     let value = match number::parse(token, scalar == Scalar::F32) {
         Some((value, length)) if length == token.len() => value,
@@ -270,7 +270,7 @@ fn text_bits(token: &[u8], scalar: Scalar) -> Option<u64> {
         Scalar::F64 => Some(value.to_bits()),
         // Beyond this a double no longer names one whole number.
         _ if value.trunc() == value && value.abs() <= 9_007_199_254_740_992.0 => {
-            scalar.from_whole(value < 0.0, value.abs() as u64)
+            scalar.hold(value < 0.0, value.abs() as u64)
         }
         _ => None,
     }

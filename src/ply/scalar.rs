@@ -87,7 +87,7 @@ impl Scalar {
     }
 
     /// The bits of a whole number of that sign and size in an integer type; none if the type does not hold it.
-    pub fn from_whole(self, negative: bool, size: u64) -> Option<u64> {
+    pub fn hold(self, negative: bool, size: u64) -> Option<u64> {
         let most = u64::MAX >> (64 - 8 * self.size());
         let most = match (self.is_signed(), negative) {
             (true, true) => most / 2 + 1,
