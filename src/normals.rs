@@ -104,6 +104,7 @@ struct Cube<'a> {
 }
 
 impl<'a> Cube<'a> {
+    #[inline(always)]
     fn new(nodes: &'a GoodNodes, own: Node, bit: u32) -> Self {
         let place = Surroundings::place(bit);
         let centre = cube_centre(bit);
@@ -118,6 +119,7 @@ impl<'a> Cube<'a> {
     }
 
     /// Takes from the two cubes of each column the node that lies nearer to the own plane, `own . x = offset`.
+    #[inline(always)]
     fn fill_columns(&mut self, offset: f32) {
         let [along, along_u, along_v] = self.strides;
         // The first of the 27 places.
@@ -132,7 +134,7 @@ impl<'a> Cube<'a> {
     }
 
     /// How far the node at a place lies from the own plane; infinitely far if there is none.
-    #[inline]
+    #[inline(always)]
     fn distance(&self, place: usize, offset: f32) -> f32 {
         let node = &self.nodes.0[place];
         if node.normal == Vec3::ZERO { f32::INFINITY } else { (self.own.dot(node.position) - offset).abs() }
@@ -158,6 +160,7 @@ impl<'a> Cube<'a> {
     }
 
     /// Bits 0, 1 and 2 of the number tell whether the octant lies above the centre along u, v and the axis.
+    #[inline(always)]
     fn octant(&self, number: usize) -> Octant {
         if self.own == Vec3::ZERO {
             // Without an own plane there is no axis and no common side: the points take the nearest node.
@@ -170,7 +173,7 @@ impl<'a> Cube<'a> {
     }
 
     /// The node at a place, if there is one.
-    #[inline]
+    #[inline(always)]
     fn see(&self, place: u8) -> Option<Seen> {
         let GoodNode { position, normal } = self.nodes.0[usize::from(place)];
         let side = normal.dot(self.own);
@@ -215,6 +218,7 @@ struct Pair {
 
 impl Pair {
     /// A missing node is replaced by the other; of two that coincide along u, the mean counts.
+    #[inline(always)]
     fn new(a: Option<Seen>, b: Option<Seen>) -> Option<Self> {
         let (a, b) = (a.or(b)?, b.or(a)?);
         let (length, gain) = (b.u - a.u, b.normal_and_v - a.normal_and_v);
@@ -226,7 +230,7 @@ impl Pair {
     }
 
     /// Normal and v between the two nodes (paper, Eq. 15 and 16).
-    #[inline]
+    #[inline(always)]
     fn at(&self, u: f32) -> Vec4 {
         self.first + self.gain * clamp((u - self.u) * self.scale)
     }
@@ -240,6 +244,7 @@ struct Octant {
 
 impl Octant {
     /// From the nodes at the near and far column along u, in the near row and in the far row.
+    #[inline(always)]
     fn new(a: Option<Seen>, b: Option<Seen>, c: Option<Seen>, d: Option<Seen>) -> Self {
         const NONE: Pair = Pair { u: 0.0, scale: 0.0, first: Vec4::ZERO, gain: Vec4::ZERO };
         let used = [a.is_some(), b.is_some(), c.is_some(), d.is_some()].iter().filter(|is_there| **is_there).count();
@@ -249,7 +254,7 @@ impl Octant {
     }
 
     /// The interpolated unit normal (paper, Eq. 15 to 17); `None` where the nodes cancel each other.
-    #[inline]
+    #[inline(always)]
     fn normal(&self, u: f32, v: f32) -> Option<Vec3> {
         let (a, b) = (self.pairs[0].at(u), self.pairs[1].at(u));
         let length = b.w - a.w;
@@ -263,6 +268,7 @@ impl Octant {
 /// Between 0 and 1. Comparisons, because `f32::clamp` is slow in WebAssembly.
 #[inline]
 #[allow(clippy::manual_clamp)]
+#[inline(always)]
 fn clamp(weight: f32) -> f32 {
     if weight < 0.0 {
         0.0
