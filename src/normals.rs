@@ -266,9 +266,8 @@ impl Octant {
 }
 
 /// Between 0 and 1. Comparisons, because `f32::clamp` is slow in WebAssembly.
-#[inline]
-#[allow(clippy::manual_clamp)]
 #[inline(always)]
+#[allow(clippy::manual_clamp)]
 fn clamp(weight: f32) -> f32 {
     if weight < 0.0 {
         0.0
