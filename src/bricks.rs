@@ -2,12 +2,11 @@
 
 use crate::error::Error;
 use crate::lattice::Lattice;
-use crate::parallel::{self, Filling, Scatter};
+use crate::parallel::{self, Filling, Gathering, Scatter};
 use crate::points::{CHUNK, Points, reserve};
 use crate::progress::Stage;
 use glam::IVec3;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-use std::sync::{Mutex, PoisonError};
 
 /// The occupied bricks, numbered from 0 in the order z, y, x.
 pub(crate) struct Bricks {
@@ -96,7 +95,7 @@ impl Bricks {
 
     fn in_table(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
         // Sorted below, so the order in which the chunks come does not matter.
-        let found = Mutex::new(Vec::new());
+        let found = Gathering::new("the grid");
         stage.part(0.0..0.5).run(points.chunks(), &|i| {
             let mut places: Vec<IVec3> = Vec::new();
             for &point in points.chunk(i) {
@@ -107,9 +106,9 @@ impl Bricks {
                 }
             }
             sort(&mut places);
-            found.lock().unwrap_or_else(PoisonError::into_inner).append(&mut places);
+            found.append(places);
         })?;
-        let mut places = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let mut places = found.all()?;
         sort(&mut places);
         places.shrink_to_fit();
 

@@ -1,12 +1,12 @@
 //! The edge of the cubes.
 
 use crate::error::Error;
+use crate::number;
 use crate::options::Cell;
-use crate::parallel;
+use crate::parallel::{self, Gathering};
 use crate::points::{Bounds, Bulk, Points};
 use crate::power::{exp2, log2};
 use glam::{DVec3, UVec3};
-use std::sync::{Mutex, PoisonError};
 
 /// Points in an occupied cube that 'auto' aims at: with the 26 cubes round it some 36 points, as accurate on clean
 /// surfaces as 30 nearest neighbours.
@@ -40,11 +40,18 @@ pub(crate) fn paper_edge(extent: DVec3, count: usize) -> f64 {
 }
 
 /// The edge that `cell` asks for, in units of the positions.
-pub(crate) fn edge(cell: Cell, points: &Points, bounds: &Bounds) -> Result<f64, Error> {
+pub(crate) fn edge(cell: Cell, points: &Points, bounds: &Bounds, bulk: &Bulk) -> Result<f64, Error> {
     match cell {
         Cell::Scale(scale) => Ok(scale * paper_edge(bounds.extent(), bounds.finite)),
-        Cell::Size(size) => Ok(size / points.unit),
-        Cell::Auto => Ok(populated_edge(points, bounds)),
+        Cell::Size(size) => {
+            let edge = size / points.unit;
+            if edge.is_normal() && edge.recip().is_normal() {
+                return Ok(edge);
+            }
+            let size = number::text(size);
+            Err(Error::input(format_args!("cell.size is {size}, out of all proportion to the cloud; wanted another")))
+        }
+        Cell::Auto => populated_edge(points, bounds, bulk),
     }
 }
 
@@ -54,27 +61,26 @@ pub(crate) fn edge(cell: Cell, points: &Points, bounds: &Bounds) -> Result<f64, 
 /// So a few points chosen at random ("probes") tell it without bias, whatever the extent of the cloud: the cubes round
 /// them are halved until they hold too few points. Stray points weigh as little as they are few.
 /// Costs one pass over the points.
-fn populated_edge(points: &Points, bounds: &Bounds) -> f64 {
-    let at = |i: usize| points.positions[i].as_dvec3();
-    let bulk = Bulk::of(points.len(), &at);
+fn populated_edge(points: &Points, bounds: &Bounds, bulk: &Bulk) -> Result<f64, Error> {
     let extent = if bulk.extent > 0.0 { bulk.extent } else { bounds.extent().max_element() };
-    if extent <= 0.0 {
-        return 1.0;
+    if extent <= 0.0 || bulk.sample.is_empty() {
+        // One point, or hardly any that is finite.
+        return Ok(paper_edge(bounds.extent(), bounds.finite));
     }
-    let probes = Probes::place(&bulk, extent, bounds.finite);
-    let counts = probes.count(points);
+    let probes = Probes::place(bulk, extent, bounds.finite);
+    let counts = probes.count(points)?;
     // Points that coincide can't be told apart by any edge, so they count as one.
     let target = POINTS_PER_CELL * counts[LEVELS as usize];
     let Some(level) = counts.iter().position(|&count| count < target) else {
-        return probes.edge;
+        return Ok(probes.edge);
     };
     if level == 0 {
         // A probe is too small already. On a surface the points of a cube grow with its edge squared.
-        return probes.edge * (target / counts[0]).sqrt();
+        return Ok(probes.edge * (target / counts[0]).sqrt());
     }
     let (coarse, fine) = (counts[level - 1], counts[level]);
     let share = log2(coarse / target) / log2(coarse / fine);
-    probes.edge * exp2(1.0 - level as f64 - share)
+    Ok(probes.edge * exp2(1.0 - level as f64 - share))
 }
 
 /// Cubes of one grid that hold a chosen point each, with the number of chosen points in them.
@@ -132,10 +138,10 @@ impl Probes {
     }
 
     /// Points in an occupied cube for the probes' edge halved 0 to [`LEVELS`] times.
-    fn count(&self, points: &Points) -> Vec<f64> {
+    fn count(&self, points: &Points) -> Result<Vec<f64>, Error> {
         // The probe of each point, then a Morton code: points in one cube of any level share the first bits. Sorted below,
         // so the order in which the chunks come does not matter.
-        let found = Mutex::new(Vec::new());
+        let found = Gathering::new("the sampled points");
         parallel::each(points.chunks(), &|i| {
             let mut codes: Vec<u64> = Vec::new();
             for point in points.chunk(i) {
@@ -147,9 +153,9 @@ impl Probes {
                     codes.push(u64::from(probe) << (3 * LEVELS) | u64::from(place));
                 }
             }
-            found.lock().unwrap_or_else(PoisonError::into_inner).append(&mut codes);
+            found.append(codes);
         });
-        let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let mut found = found.all()?;
         found.sort_unstable();
 
         let mut share = vec![0.0; LEVELS as usize + 1];
@@ -163,7 +169,7 @@ impl Probes {
                 *share += weight * occupied as f64 / probe.len() as f64;
             }
         }
-        share.into_iter().map(|share| chosen / share).collect()
+        Ok(share.into_iter().map(|share| chosen / share).collect())
     }
 }
 

@@ -30,7 +30,7 @@ pub struct Report {
     pub cells: u64,
     /// Cubes that hold their node.
     pub nodes: u64,
-    /// Cubes along each axis of the bounding box.
+    /// Cubes along each axis of the bounding box, at most 2^30.
     pub grid: [u64; 3],
     /// Edge of a cube, in units of the input.
     pub cell_size: f64,
@@ -47,7 +47,8 @@ pub struct Report {
 /// Output length equals input length; a point that is not finite, or that has no neighbours to tell a plane from, gets
 /// the zero vector and influences no other. The result is the same to the bit for any number of threads.
 ///
-/// Linear in the number of points. Takes up to 44 bytes a point beyond the input, plus 60 bytes for each occupied cube.
+/// Linear in the number of points. Takes about 35 bytes a point beyond the input when cubes hold 4 points or more, and up
+/// to some 130 when every point has a cube for itself.
 ///
 /// # Errors
 /// [`Error::Input`] and [`Error::Unsupported`] for the options, [`Error::Limit`] when memory does not suffice,
@@ -56,11 +57,7 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     options.validate()?;
     // Places and counts are 32-bit numbers.
     if points.len() >= u32::MAX as usize {
-        return Err(Error::Limit {
-            message: format!("the cloud has {} points; at most {} fit", points.len(), u32::MAX - 1),
-            needed: points.len() as u64,
-            available: Some(u64::from(u32::MAX - 1)),
-        });
+        return Err(Error::input(format_args!("the cloud has {} points; at most {} fit", points.len(), u32::MAX - 1)));
     }
     let mut laps = Laps::start(progress);
 
@@ -69,9 +66,9 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     laps.end("bounds");
 
     progress.update("cellSize", 0.03)?;
-    let edge = cell::edge(options.cell, points, &bounds)?;
-    let centre = Bulk::of(points.len(), &|i| points.positions[i].as_dvec3()).median;
-    let lattice = Lattice::new(bounds.min.as_dvec3(), bounds.max.as_dvec3(), centre, edge);
+    let bulk = Bulk::of(points.len(), &|i| points.positions[i].as_dvec3());
+    let edge = cell::edge(options.cell, points, &bounds, &bulk)?;
+    let lattice = Lattice::new(bounds.min.as_dvec3(), bounds.max.as_dvec3(), bulk.median, edge);
     laps.end("cellSize");
 
     let (grid, moments) = Grid::sort(points, &lattice, &progress.stage("sort", 0.06..0.55))?;
@@ -89,7 +86,7 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
         unresolved: result.unresolved,
         cells: grid.cubes() as u64,
         nodes: nodes.iter().filter(|node| Node::is_good(node)).count() as u64,
-        grid: ((bounds.extent() / edge).floor() + 1.0).as_u64vec3().to_array(),
+        grid: lattice.size.as_u64vec3().to_array(),
         cell_size: edge * points.unit,
         scale: edge / paper_edge,
         nodes_used: result.nodes_used,

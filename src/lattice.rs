@@ -16,7 +16,7 @@ pub(crate) struct Lattice {
     /// 1 / edge.
     scale: f64,
     /// Cubes along each axis.
-    size: DVec3,
+    pub size: DVec3,
 }
 
 impl Lattice {

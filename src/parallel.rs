@@ -8,6 +8,7 @@ use crate::points::reserve;
 use std::marker::PhantomData;
 use std::mem::MaybeUninit;
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 /// How many threads share the work.
 pub(crate) fn threads() -> usize {
@@ -63,6 +64,37 @@ impl<'a, T> Scatter<'a, T> {
         assert!(range.start <= range.end && range.end <= self.length);
         // SAFETY: in bounds by the line above, not shared by the caller's promise.
         unsafe { std::slice::from_raw_parts_mut(self.start.add(range.start), range.len()) }
+    }
+}
+
+/// A list that tasks append to, in whatever order they come; or the memory that it lacked.
+pub(crate) struct Gathering<T> {
+    what: &'static str,
+    items: Mutex<Result<Vec<T>, Error>>,
+}
+
+impl<T> Gathering<T> {
+    /// An empty list of what the error would call `what`.
+    pub fn new(what: &'static str) -> Self {
+        Self { what, items: Mutex::new(Ok(Vec::new())) }
+    }
+
+    /// Appends a task's items.
+    pub fn append(&self, mut more: Vec<T>) {
+        let mut items = self.items.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Ok(list) = &mut *items {
+            if list.try_reserve(more.len()).is_ok() {
+                list.append(&mut more);
+            } else {
+                let needed = (list.len() + more.len()) as u64 * size_of::<T>() as u64;
+                *items = Err(Error::memory(self.what, needed));
+            }
+        }
+    }
+
+    /// All items, in an order that depends on the threads: to be sorted.
+    pub fn all(self) -> Result<Vec<T>, Error> {
+        self.items.into_inner().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

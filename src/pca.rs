@@ -24,16 +24,16 @@ pub(crate) struct Moments {
 impl Moments {
     /// The sums of some points. Adds in double precision, so that a cube may hold any number of points.
     pub fn of(points: impl Iterator<Item = Vec3>) -> Self {
-        let (mut count, mut sum) = (0.0, DVec3::ZERO);
+        let (mut count, mut sum) = (0u32, DVec3::ZERO);
         let (mut squares, mut products) = (DVec3::ZERO, DVec3::ZERO);
         for point in points {
             let p = point.as_dvec3();
-            count += 1.0;
+            count += 1;
             sum += p;
             squares += p * p;
             products += DVec3::new(p.y * p.z, p.x * p.z, p.x * p.y);
         }
-        Self { count, sum: sum.as_vec3(), squares: squares.as_vec3(), products: products.as_vec3() }
+        Self { count: count as f32, sum: sum.as_vec3(), squares: squares.as_vec3(), products: products.as_vec3() }
     }
 
     /// Adds the sums of the cube that lies `step` cubes away, shifted into this cube's coordinates.
@@ -135,5 +135,29 @@ impl Symmetric {
             }
         }
         root
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Single precision counts by ones to 2^24 only.
+    #[test]
+    fn a_cube_may_hold_any_number_of_points() {
+        let corners = [Vec3::new(-0.4, -0.3, 0.1), Vec3::new(0.4, -0.3, 0.1), Vec3::new(0.0, 0.3, 0.1)];
+        let few = Moments::of(corners.into_iter());
+        let many = Moments::of(corners.into_iter().cycle().take(18_000_000));
+        assert_eq!(many.count, 18e6);
+        let (few, many) = (few.plane().unwrap(), many.plane().unwrap());
+        assert!(few.0.distance(many.0) < 1e-6 && few.1.distance(many.1) < 1e-6, "{few:?} {many:?}");
+    }
+
+    #[test]
+    fn points_on_a_line_and_in_one_place_have_no_plane() {
+        let line = |step: Vec3| Moments::of((0..100).map(|i| step * (i as f32 / 100.0 - 0.5)));
+        for step in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::new(0.5, -0.7, 0.3), Vec3::ZERO] {
+            assert_eq!(line(step).plane(), None, "{step}");
+        }
     }
 }

@@ -165,7 +165,7 @@ impl Bulk {
     pub fn of(count: usize, at: &dyn Fn(usize) -> DVec3) -> Self {
         let step = count.div_ceil(SAMPLE).max(1);
         // A different place in each stride, so that the rows of a scan do not fall in step with the sample.
-        let place = |i: usize| (i * step + i.wrapping_mul(0x9E37_79B9) % step).min(count - 1);
+        let place = |i: usize| (i * step + (i as u32).wrapping_mul(0x9E37_79B9) as usize % step).min(count - 1);
         let sample: Vec<DVec3> = (0..count.div_ceil(step)).map(|i| at(place(i))).filter(|p| p.is_finite()).collect();
         let mut bulk = Self { median: DVec3::ZERO, extent: 0.0, sample };
         if bulk.sample.is_empty() {

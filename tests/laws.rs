@@ -262,6 +262,25 @@ fn options_out_of_range_are_refused_with_what_was_wanted() {
     assert!(matches!(Points::from_f64(&[1.0; 5]), Err(Error::Input(text)) if text.contains("multiple of 3")));
 }
 
+#[test]
+fn a_cube_edge_out_of_all_proportion_is_refused() {
+    for (size, unit) in [(5e-324, 1.0), (1e-300, 1e40), (1e308, 1e-40)] {
+        let points: Vec<f64> = sphere(100, 18).points.iter().map(|c| f64::from(*c) * unit).collect();
+        let options = Options { cell: Cell::Size(size), ..Options::default() };
+        let error = estimate(&Points::from_f64(&points).unwrap(), &options, &Progress::silent()).unwrap_err();
+        assert!(matches!(&error, Error::Input(text) if text.contains("cell.size")), "{error:?}");
+    }
+}
+
+#[test]
+fn hardly_any_finite_point() {
+    let mut points = vec![f32::NAN; 60_000];
+    points[300..309].copy_from_slice(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    for cell in CELLS {
+        check("hardly any finite point", &points, cell);
+    }
+}
+
 /// Doubles beyond the range of single precision on either side.
 #[test]
 fn doubles_of_any_magnitude() {

@@ -231,6 +231,21 @@ fn far_doubles_come_relative_to_an_origin() {
     }
 }
 
+/// Survey files often have doubles for east and north, and a single for the height.
+#[test]
+fn far_coordinates_of_mixed_types_come_relative_to_one_origin() {
+    let coordinates = |i: usize| [431_000.125 + i as f64, 4_580_000.0 + i as f64, 512.5 + i as f64 * 0.25];
+    let rows: Vec<Vec<V>> =
+        (0..100).map(coordinates).map(|[x, y, z]| vec![V::F64(x), V::I32(y as i32), V::F32(z as f32)]).collect();
+    for file in in_all_formats(&["double x", "int y", "float z"], &rows) {
+        let cloud = read(file).unwrap();
+        for point in 0..100 {
+            let found = [0, 1, 2].map(|axis| cloud.origin[axis] + f64::from(cloud.positions[3 * point + axis]));
+            assert_eq!(found, coordinates(point));
+        }
+    }
+}
+
 #[test]
 fn near_doubles_and_all_floats_keep_a_zero_origin() {
     let near = [[0.1, 0.2, 0.3], [1.0, 2.0, 3.0], [-1.0, -2.0, -3.0]];

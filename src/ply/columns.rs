@@ -216,8 +216,8 @@ impl Places<'_> {
         if column.scalar == Scalar::F64 {
             source.each(places, width, column.component, |b| relative(f64::from_le_bytes(b), origin));
         } else {
-            // A single is where the origin is zero.
-            source.each(places, width, column.component, f32::from_le_bytes);
+            // Exact where the origin is zero.
+            source.each(places, width, column.component, |b| relative(f64::from(f32::from_le_bytes(b)), origin));
         }
     }
 }
