@@ -57,6 +57,10 @@ export { init as default };
   // Nor does anything else call this border than serve.ts, whose types the compiler checks.
   edit(/ *_assertClass\(.*\);\n/g, '');
   edit(/if \(Symbol\.dispose\).*\n/g, '');
+  // Properties that only the glue itself uses.
+  edit(/__destroy_into_raw/g, 'raw');
+  edit(/__wbg_ptr/g, 'at');
+  edit(/__wrap/g, 'wrap');
   return glue;
 }
 

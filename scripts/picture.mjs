@@ -1,7 +1,6 @@
 // npm run picture: takes docs/picture.jpg, the picture of the README, from the page with its sample.
 
 import { join } from 'node:path';
-import { openBrowser, result } from '../tests/browser/browser.mjs';
 import { build, buildPage } from './build.mjs';
 import { main, root } from './run.mjs';
 import { setup } from './setup.mjs';
@@ -10,6 +9,8 @@ await main(async () => {
   setup({ browser: true });
   build();
   buildPage();
+  // Not before the set-up: it needs npm packages.
+  const { openBrowser, result } = await import('../tests/browser/browser.mjs');
   const browser = await openBrowser();
   try {
     const page = await browser.openPage(`${browser.isolated}?sample`, { viewport: { width: 1280, height: 720 } });

@@ -13,6 +13,7 @@ mod ply;
 
 pub use buffer::Buffer;
 pub use estimate::{Estimation, estimate};
+pub use memory::set_maximum;
 pub use ply::{Cloud, read_ply, write_cloud, write_ply};
 #[cfg(feature = "threads")]
 pub use wasm_bindgen_rayon::init_thread_pool;

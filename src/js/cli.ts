@@ -76,7 +76,6 @@ function parse(args: string[]): Task | undefined {
   if (more.length) throw new UsageError(`one input file at a time; ${more.join(' ')} came too`);
   if (!values.out) throw new UsageError('no output file; give one with -o');
   if (values.out === '-') throw new UsageError('the output cannot be standard output, where the report goes');
-  if (values.json && values.quiet) throw new UsageError('--json and --quiet exclude each other');
   const estimate: EstimateOptions = {};
   if (values.method !== undefined) estimate.method = choice('method', values.method, ['bilinear', 'knn', 'egg']);
   const cells = [values.cell, values['cell-scale'], values['cell-size']].filter((value) => value !== undefined);
@@ -219,7 +218,9 @@ async function writeWhole(path: string, contents: Blob): Promise<void> {
   };
   process.on('SIGINT', interrupted).on('SIGTERM', interrupted);
   try {
-    await writePieces(await open(temporary, 'wx', existing?.mode), contents);
+    const file = await open(temporary, 'wx');
+    if (existing) await file.chmod(existing.mode);
+    await writePieces(file, contents);
     await rename(temporary, target);
   } catch (error) {
     remove();

@@ -17,6 +17,7 @@ export interface Host {
 
 interface Job {
   call: Call;
+  signal?: AbortSignal;
   tell(phase: string, fraction: number): void;
   resolve(result: any): void;
   reject(error: unknown): void;
@@ -67,6 +68,11 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
   function next() {
     if (running) return;
     running = queue.shift();
+    // One signal may have stopped many calls.
+    while (running?.signal?.aborted) {
+      running.reject(running.signal.reason);
+      running = queue.shift();
+    }
     if (!running) return link?.hold(false);
     try {
       running.begun = performance.now();
@@ -119,10 +125,9 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
   }
 
   /** Queues what `prepare` makes, which copies or takes the arguments before its first wait. */
-  async function run(
-    { signal, onProgress }: ReadOptions,
-    prepare: (tell: Job['tell']) => Call | Promise<Call>,
-  ): Promise<any> {
+  async function run(options: ReadOptions, prepare: (tell: Job['tell']) => Call | Promise<Call>): Promise<any> {
+    want(options, 'options', options, 'an object');
+    const { signal, onProgress } = options;
     signal?.throwIfAborted();
     let told = 0;
     const tell = (phase: string, fraction: number) => {
@@ -136,10 +141,12 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
       if (disposed) throw disposed;
       let job!: Job;
       const result: any = await new Promise((resolve, reject) => {
-        job = { call, tell, resolve, reject, begun: 0 };
+        job = { call, signal, tell, resolve, reject, begun: 0 };
         abort = () => {
           if (running === job) return crash(signal!.reason);
-          queue.splice(queue.indexOf(job), 1);
+          const at = queue.indexOf(job);
+          // Elsewhere: it is settled.
+          if (at >= 0) queue.splice(at, 1);
           reject(signal!.reason);
         };
         signal?.addEventListener('abort', abort);
@@ -163,11 +170,11 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
         want(/^Float(32|64)Array$/.test(kind), 'positions', positions, 'a Float32Array or Float64Array');
         const { length } = positions;
         want(length % 3 === 0, 'the length of positions', length, 'a multiple of 3, x y z of each point');
-        const { method, cell, k, orient, curvature, transfer } = options;
+        const { transfer, signal, onProgress, ...rest } = options;
         return {
           kind: 'estimate',
           // What waits in the queue must not change, and a proxy of a framework cannot be posted.
-          options: JSON.parse(JSON.stringify({ method, cell, k, orient, curvature }, keepNumbers)),
+          options: JSON.parse(JSON.stringify(rest, keepNumbers)),
           double: kind > 'Float5',
           positions: own(positions, transfer),
         };
@@ -187,11 +194,11 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
         want(ascii || format === 'binary_little_endian', 'format', format, `'binary_little_endian' or 'ascii'`);
         const curvature = pack('curvature', add?.curvature);
         const normals = pack('normals', add?.normals);
-        if (!(cloud && 'positions' in cloud))
+        if (!(Object(cloud) === cloud && 'positions' in cloud))
           return { kind: 'write', normals, curvature, ascii, file: await resolve(cloud, host.files, tell, signal) };
         return {
           kind: 'writeCloud',
-          positions: pack('positions', cloud.positions)!,
+          positions: pack('positions', cloud.positions ?? null)!,
           origin: Float64Array.from(cloud.origin ?? [0, 0, 0]),
           normals: normals ?? pack('normals', cloud.normals),
           colors: pack('colors', cloud.colors, 'Uint8Array'),
@@ -219,8 +226,8 @@ const keepNumbers = (_: string, value: unknown) =>
   typeof value === 'number' && !Number.isFinite(value) ? String(value) : value;
 
 /** A copy of an optional array; the worker counts what is in it. */
-function pack(name: string, array?: Float32Array | Uint8Array, kind = 'Float32Array'): Uint8Array | undefined {
+function pack(name: string, array?: Float32Array | Uint8Array | null, kind = 'Float32Array'): Uint8Array | undefined {
   if (array === undefined) return;
   want(kindOf(array) === kind, name, array, `a ${kind}`);
-  return own(array);
+  return own(array!);
 }

@@ -11,9 +11,10 @@ export const starter =
     const worker =
       /^http/.test(module) && new URL(module).origin !== origin ? viaBlob(new URL(file, module)) : direct();
     worker.onmessage = (event) => receive(event.data);
-    worker.onerror = (event) => {
+    // Without a message: the script did not load, or what it sent cannot be read.
+    worker.onmessageerror = worker.onerror = (event: any) => {
       event.preventDefault();
-      fail(event.message || 'its script did not load');
+      fail(event.message || 'it did not load');
     };
     return {
       post: (message, transfer = []) => worker.postMessage(message, transfer),

@@ -47,8 +47,7 @@ async function loadThreads(threads: number, start: Start, platform: Platform): P
     import('./threads/bilinormal.js' as string),
     compile(start, 'threads.wasm', bundled, platform),
   ]);
-  const memory = createMemory(start, true);
-  await glue.default({ module_or_path: module, memory });
+  const memory = await begin(glue, module, createMemory(start, true));
   pool.start = platform.startThread;
   pool.channel = start.channel;
   await glue.initThreadPool(threads);
@@ -61,9 +60,14 @@ async function loadSingle(start: Start, platform: Platform, mode: Mode): Promise
     import('./single/bilinormal.js' as string),
     compile(start, 'single.wasm', bundled, platform),
   ]);
-  const memory = createMemory(start, false);
-  await glue.default({ module_or_path: module, memory });
+  const memory = await begin(glue, module, createMemory(start, false));
   return { glue, memory, mode };
+}
+
+async function begin(glue: Glue, module: WebAssembly.Module, [memory, pages]: ReturnType<typeof createMemory>) {
+  await glue.default({ module_or_path: module, memory });
+  glue.setMaximum(pages);
+  return memory;
 }
 
 // Not streamed: that would refuse servers which send .wasm under another media type, for a file this small.
@@ -77,10 +81,10 @@ async function compile({ wasmUrl }: Start, file: string, bundled: () => URL, { l
 }
 
 /** Shared memory is reserved at its maximum, and some engines refuse a large one: steps down until one is granted. */
-function createMemory({ memoryMaxMiB = 4096 }: Start, shared: boolean): WebAssembly.Memory {
+function createMemory({ memoryMaxMiB = 4096 }: Start, shared: boolean) {
   for (let maximum = memoryMaxMiB * 16; ; maximum = Math.floor(maximum / 2)) {
     try {
-      return new WebAssembly.Memory({ initial: initialPages, maximum, shared });
+      return [new WebAssembly.Memory({ initial: initialPages, maximum, shared }), maximum] as const;
     } catch (error) {
       if (maximum / 2 < leastMiB * 16) throw error;
     }

@@ -4,6 +4,7 @@ import type { Link } from './protocol.js';
 
 export function link(worker: Worker, receive: (message: any) => void, fail: (reason: string) => void): Link {
   worker.on('message', receive);
+  worker.on('messageerror', (error) => fail(error.message));
   worker.on('error', (error) => fail(error.message));
   worker.on('exit', (code) => fail(`exit code ${code}`));
   worker.unref();

@@ -27,6 +27,8 @@ export function serve(post: (reply: Reply, transfer: Transferable[]) => void, pl
       post({ result }, buffersOf(result));
     } catch (error) {
       const packed = failure(error);
+      // What fails before anything runs is a script or a module that did not load.
+      if (!started) packed.code ??= 'unsupported';
       // After a limit a new worker begins with empty memory; wasm memory never shrinks.
       post({ failure: { ...packed, fatal: !started || packed.code === 'limit' } }, []);
     }

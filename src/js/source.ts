@@ -68,5 +68,7 @@ export async function resolve(
       controller.enqueue(piece);
     },
   });
-  return new Response(body?.pipeThrough(count, { signal: signal! })).blob();
+  return new Response(body?.pipeThrough(count, { signal: signal! })).blob().catch((error) => {
+    throw error instanceof TypeError ? new BilinormalError('input', `${url} broke off: ${error.message}`) : error;
+  });
 }

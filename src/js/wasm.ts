@@ -35,6 +35,8 @@ export interface Glue {
     module_or_path: WebAssembly.Module;
     memory?: WebAssembly.Memory;
   }): Promise<{ memory: WebAssembly.Memory }>;
+  /** Tells how many pages of 64 KiB the memory may grow to. */
+  setMaximum(pages: number): void;
   Buffer: new (byteLength: number) => Buffer;
   estimate(positions: Buffer, double: boolean, options: object, tell: Tell): Estimation;
   readPly(file: Buffer, maxPoints: number | undefined, tell: Tell): Cloud;

@@ -49,7 +49,7 @@ pub fn write_cloud(cloud: &PointCloud, add: &Additions, ascii: bool) -> Result<V
         }
     }
     sink.append(b"end_header\n")?;
-    sink.make_room(row * count)?;
+    sink.make_room(row.saturating_mul(count))?;
 
     for point in 0..count {
         for axis in 0..3 {

@@ -1,10 +1,9 @@
 //! How much of its memory the module uses: a counter round the standard allocator.
 
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering::Relaxed};
+use wasm_bindgen::prelude::*;
 
-/// What a 32-bit module can address at most.
-const ADDRESSABLE: u64 = 1 << 32;
 /// No single block may be larger, whatever is free.
 const LARGEST_BLOCK: u64 = isize::MAX as u64;
 const PAGE: u64 = 65536;
@@ -14,6 +13,8 @@ static ALLOCATOR: Counting = Counting;
 
 static USED: AtomicUsize = AtomicUsize::new(0);
 static PEAK: AtomicUsize = AtomicUsize::new(0);
+/// Pages. At first all that a 32-bit module can address.
+static MAXIMUM: AtomicU32 = AtomicU32::new(65536);
 
 struct Counting;
 
@@ -70,14 +71,14 @@ pub(super) fn peak() -> u64 {
     PEAK.load(Relaxed) as u64
 }
 
-/// What could be had instead of a block of `needed` bytes that was refused.
-pub(super) fn available(needed: u64) -> u64 {
-    let used = USED.load(Relaxed) as u64;
-    let addressable = (ADDRESSABLE - used).min(LARGEST_BLOCK);
-    if needed > addressable {
-        return addressable;
-    }
-    // The host does not let the memory grow, so what it has now is all there is.
-    let grown = core::arch::wasm32::memory_size(0) as u64 * PAGE;
-    grown.saturating_sub(used).min(needed)
+/// Tells how many pages the memory may grow to. JavaScript makes the memory, and only it knows.
+#[wasm_bindgen(js_name = setMaximum)]
+pub fn set_maximum(pages: u32) {
+    MAXIMUM.store(pages, Relaxed);
+}
+
+/// What could be had instead of a block that was refused.
+pub(super) fn available() -> u64 {
+    let free = (u64::from(MAXIMUM.load(Relaxed)) * PAGE).saturating_sub(USED.load(Relaxed) as u64);
+    free.min(LARGEST_BLOCK)
 }

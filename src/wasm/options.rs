@@ -85,7 +85,7 @@ fn orient(value: &JsValue) -> Option<Orient> {
     }
 }
 
-/// Three finite numbers, in an array or a typed array.
+/// Three finite numbers, in an array.
 fn three(value: &JsValue) -> Option<[f64; 3]> {
     let number = |name| property(value, name).as_f64().filter(|number| number.is_finite());
     let numbers = [number("0")?, number("1")?, number("2")?];

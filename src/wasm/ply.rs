@@ -32,7 +32,7 @@ pub fn read_ply(
 }
 
 fn whole(max_points: f64) -> Result<u64, Error> {
-    if max_points >= 0.0 && max_points.fract() == 0.0 {
+    if max_points >= 0.0 && (max_points.fract() == 0.0 || max_points.is_infinite()) {
         return Ok(max_points as u64);
     }
     Err(Error::Input(format!("maxPoints is {}; wanted a whole number of at least 0", crate::number::text(max_points))))

@@ -152,6 +152,41 @@ test('abort: before the call, in the queue, and while wasm runs; the estimator s
   assert.equal((await estimator.estimateNormals(sphere(10))).normals.length, 30);
 });
 
+test('an abort that comes too late for its call disturbs no other', async (context) => {
+  const estimator = await estimatorFor(context, { threads: 1 });
+  const late = new AbortController();
+  const onProgress = ({ phase }) => phase === 'done' && late.abort();
+  const calls = [
+    estimator.estimateNormals(sphere(2000), { signal: late.signal, onProgress }),
+    estimator.estimateNormals(sphere(3000)),
+    estimator.estimateNormals(sphere(4000)),
+  ];
+  const results = await Promise.all(calls);
+  assert.deepEqual(
+    results.map(({ normals }) => normals.length),
+    [6000, 9000, 12000],
+  );
+});
+
+test('one signal stops all calls that were given it, and only these', async (context) => {
+  const estimator = await estimatorFor(context, { threads: 1 });
+  const control = new AbortController();
+  const told = [];
+  const stopped = [1, 2, 3].map((call) =>
+    estimator.estimateNormals(sphere(300_000), {
+      signal: control.signal,
+      onProgress: () => {
+        told.push(call);
+        control.abort(new Error('enough'));
+      },
+    }),
+  );
+  const other = estimator.estimateNormals(sphere(2000));
+  for (const call of stopped) await assert.rejects(call, /enough/);
+  assert.equal((await other).normals.length, 6000);
+  assert.deepEqual([...new Set(told)], [1]);
+});
+
 test('concurrent calls queue, and each gets its own result and progress', async () => {
   const counts = [50000, 10, 3000, 0, 20000];
   const last = counts.map(() => 0);
@@ -245,6 +280,10 @@ test('wrong arguments are input errors that say what came and what was wanted', 
     [() => writePly({ count: 10, positions }, { normals: new Float32Array(3) }), /normals.*wanted/],
     [() => writePly({ count: 10, positions, colors: new Uint8Array(3) }, {}), /colors.*wanted/],
     [() => writePly({ count: 10, positions }, {}, { format: 'obj' }), /format is obj; wanted/],
+    [() => estimateNormals(positions, null), /options is null; wanted an object/],
+    [() => estimateNormals(positions, { cel: { scale: 2 } }), /option 'cel' is unknown; wanted any of method, cell/],
+    [() => writePly('scan.ply', {}), /source is scan\.ply; wanted/],
+    [() => writePly({ positions: undefined }, {}), /positions is null; wanted a Float32Array/],
     [() => createEstimator({ threads: 0 }), /threads is 0; wanted 'auto' or 1 to 256/],
     [() => createEstimator({ memoryMaxMiB: 5000 }), /memoryMaxMiB is 5000; wanted 16 to 4096/],
   ];

@@ -9,6 +9,7 @@ import { installPacked } from './packed.mjs';
 const single = `
 let memory, used = 0;
 export default async (options) => ({ memory } = options);
+export const setMaximum = () => {};
 export class Buffer {
   constructor(byteLength) { this.byteLength = byteLength; this.pointer = used; used += byteLength; }
   free() {}

@@ -105,10 +105,8 @@ export function createSession(store: Store, viewer: Viewer): Session {
     save: () =>
       run('Saving', async (step) => {
         if (!shown?.normals) return;
-        step.begin('Saving');
         const { file, normals } = shown;
-        const ply = await writePly(file, { normals });
-        step.signal.throwIfAborted();
+        const ply = await writePly(file, { normals }, { signal: step.signal, onProgress: step.begin('Saving') });
         download(ply, `${file.name.replace(/\.[^.]*$/, '')}-normals.ply`);
       }),
 
