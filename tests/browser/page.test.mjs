@@ -170,12 +170,15 @@ test('points that are not finite and a stray one neither blank the view nor shri
 
 test('a keyboard alone opens a file', async () => {
   page = await browser.openPage(browser.isolated);
+  // Asked for early, because the browser takes a while to hand choosers over.
+  const chosen = page.waitForEvent('filechooser');
   const focused = () => page.evaluate(() => document.activeElement.textContent.trim());
   for (let presses = 0; (await focused()) !== 'Choose a PLY file'; presses++) {
     assert.ok(presses < 5, 'the button is not reached by Tab');
     await page.keyboard.press('Tab');
   }
-  const [chooser] = await Promise.all([page.waitForEvent('filechooser'), page.keyboard.press('Enter')]);
+  await page.keyboard.press('Enter');
+  const chooser = await chosen;
   await chooser.setFiles({ name: 'ball.ply', mimeType: '', buffer: spherePly(5_000) });
   await result(page, 'ball.ply');
 });
