@@ -88,7 +88,10 @@ async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Plat
     case 'hello':
       return mode;
     case 'estimate': {
-      const estimation = glue.estimate(put(call.positions), call.double, call.options, tell);
+      const positions = put(call.positions);
+      // Not kept in JavaScript memory meanwhile: 12 or 24 bytes a point.
+      delete (call as Partial<typeof call>).positions;
+      const estimation = glue.estimate(positions, call.double, call.options, tell);
       const normals = new Float32Array(take(estimation.takeNormals())!);
       const report = { ...estimation.report, ...mode };
       estimation.free();
