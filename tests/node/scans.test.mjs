@@ -38,7 +38,9 @@ if (!existsSync(data)) {
         }
         assert.deepEqual({ status, stderr }, { status: 0, stderr: '' });
         const { points, unresolved } = JSON.parse(stdout);
-        assert.ok(unresolved < points / 5, `${unresolved} of ${points} without a normal`);
+        // The rings of a spinning lidar lie too far apart for a plane in the sparse parts.
+        const most = name === 'small_gicp_source.ply' ? 0.1 : 0.01;
+        assert.ok(unresolved <= points * most, `${unresolved} of ${points} without a normal`);
         compare(parsePly(bytes), parsePly(readFileSync(output)));
       });
     }
