@@ -8,8 +8,8 @@ type Observer<'a> = dyn Fn(&'static str, f64) -> ControlFlow<()> + 'a;
 
 /// The caller's side of a long call: it hears of progress, may stop the call, and lends it a clock.
 ///
-/// Both functions are called from the calling thread only, the observer a few times per phase and
-/// about every million points.
+/// Both functions are called from the calling thread only, the observer at the beginning and end of each phase and some
+/// twenty times a second.
 pub struct Progress<'a> {
     observer: &'a Observer<'a>,
     clock: &'a dyn Fn() -> f64,
@@ -54,9 +54,10 @@ pub(crate) struct Stage<'a> {
 
 impl Stage<'_> {
     /// Runs `work` for each number below `count`, in parallel. Between batches it tells the observer and lets it stop
-    /// the call: with tasks of some ten thousand points, every few milliseconds.
+    /// the call: with tasks of some ten thousand points, some twenty times a second. Threads wait for each other
+    /// at the end of a batch, so smaller ones cost time.
     pub fn run(&self, count: usize, work: &(dyn Fn(usize) + Sync)) -> Result<(), Error> {
-        let batch = 8 * parallel::threads();
+        let batch = 64 * parallel::threads();
         let mut done = 0;
         while done < count {
             let fraction = done as f64 / count as f64;
