@@ -1,12 +1,13 @@
 //! The pipeline: the only file that knows all stages.
 
+use crate::baseline::{self, Baseline, Tree};
+use crate::bilinear;
 use crate::cell;
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::lattice::Lattice;
 use crate::nodes::{self, Node};
-use crate::normals;
-use crate::options::Options;
+use crate::options::{Method, Options};
 use crate::points::{Bounds, Bulk, Points};
 use crate::progress::Progress;
 
@@ -26,7 +27,7 @@ pub struct Report {
     pub points: u64,
     /// Points that got the zero vector: not finite, or without neighbours that determine a plane.
     pub unresolved: u64,
-    /// Cubes that hold points.
+    /// Cubes that hold points. This and all about cubes and nodes is 0 for the baselines, which have none.
     pub cells: u64,
     /// Cubes that hold their node.
     pub nodes: u64,
@@ -36,7 +37,8 @@ pub struct Report {
     pub cell_size: f64,
     /// Edge of a cube, in multiples of the paper's L (Eq. 1).
     pub scale: f64,
-    /// Points interpolated from 0, 1, 2, 3 and 4 nodes. Those from 0 took the nearest node or their own plane.
+    /// Points interpolated from 0, 1, 2, 3 and 4 nodes. Those from 0 took the nearest node or their own plane, or were
+    /// found by a baseline.
     pub nodes_used: [u64; 5],
     /// Phases in their order, and what each took by the clock of the [`Progress`].
     pub milliseconds: Vec<(&'static str, f64)>,
@@ -65,9 +67,25 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     let bounds = Bounds::of(points);
     laps.end("bounds");
 
-    progress.update("cellSize", 0.03)?;
     let bulk = Bulk::of(points.len(), &|i| points.positions[i].as_dvec3());
-    let edge = cell::edge(options.cell, points, &bounds, &bulk)?;
+    match options.method {
+        Method::Bilinear => bilinear(points, options, &bounds, &bulk, laps),
+        Method::Knn => baseline(points, Baseline::Knn { k: options.k.unwrap_or(16) as usize }, &bounds, &bulk, laps),
+        Method::Egg => baseline(points, Baseline::Egg { k: options.k.unwrap_or(8) as usize }, &bounds, &bulk, laps),
+    }
+}
+
+/// The paper's method.
+fn bilinear(
+    points: &Points,
+    options: &Options,
+    bounds: &Bounds,
+    bulk: &Bulk,
+    mut laps: Laps,
+) -> Result<Estimate, Error> {
+    let progress = laps.progress;
+    progress.update("cellSize", 0.03)?;
+    let edge = cell::edge(options.cell, points, bounds, bulk)?;
     let lattice = Lattice::new(bounds.min.as_dvec3(), bounds.max.as_dvec3(), bulk.median, edge);
     laps.end("cellSize");
 
@@ -77,22 +95,47 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     drop(moments);
     laps.end("nodes");
     let stage = progress.stage("interpolation", 0.65..1.0);
-    let result = normals::interpolate(&grid, &nodes, points.len(), &stage)?;
+    let (normals, resolved, nodes_used) = bilinear::interpolate(&grid, &nodes, points.len(), &stage)?;
     laps.end("interpolation");
 
     let paper_edge = cell::paper_edge(bounds.extent(), bounds.finite);
     let report = Report {
         points: points.len() as u64,
-        unresolved: result.unresolved,
+        unresolved: points.len() as u64 - resolved,
         cells: grid.cubes() as u64,
         nodes: nodes.iter().filter(|node| Node::is_good(node)).count() as u64,
         grid: lattice.size.as_u64vec3().to_array(),
         cell_size: edge * points.unit,
         scale: edge / paper_edge,
-        nodes_used: result.nodes_used,
+        nodes_used,
         milliseconds: laps.ended,
     };
-    Ok(Estimate { normals: result.normals, report })
+    Ok(Estimate { normals, report })
+}
+
+/// The methods it is compared with.
+fn baseline(
+    points: &Points,
+    baseline: Baseline,
+    bounds: &Bounds,
+    bulk: &Bulk,
+    mut laps: Laps,
+) -> Result<Estimate, Error> {
+    let progress = laps.progress;
+    let tree = Tree::build(points, bounds, bulk, &progress.stage("tree", 0.03..0.2))?;
+    laps.end("tree");
+    let stage = progress.stage("normals", 0.2..1.0);
+    let (normals, resolved) = baseline::normals(&tree, baseline, points.len(), &stage)?;
+    laps.end("normals");
+    let count = points.len() as u64;
+    let report = Report {
+        points: count,
+        unresolved: count - resolved,
+        nodes_used: [count, 0, 0, 0, 0],
+        milliseconds: laps.ended,
+        ..Report::default()
+    };
+    Ok(Estimate { normals, report })
 }
 
 /// A stop-watch that notes a time for each phase.

@@ -9,6 +9,8 @@
 //! ```
 #![warn(missing_docs)]
 
+mod baseline;
+mod bilinear;
 mod bricks;
 mod cell;
 mod error;

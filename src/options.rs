@@ -8,9 +8,10 @@ use crate::number::text;
 pub struct Options {
     /// How a normal is found. Default: [`Method::Bilinear`].
     pub method: Method,
-    /// Edge of the cubes. Default: [`Cell::Auto`].
+    /// Edge of the cubes. Default: [`Cell::Auto`]. The baselines have no cubes.
     pub cell: Cell,
-    /// Number of neighbours of the baselines; `None` is their default.
+    /// How many nearest points the baselines look at, at least 3; if there are fewer, all. Default: 16 for
+    /// [`Method::Knn`], the point itself among them; 8 others for [`Method::Egg`].
     pub k: Option<u32>,
     /// How signs are chosen. Default: [`Orient::None`].
     pub orient: Orient,
@@ -18,15 +19,20 @@ pub struct Options {
     pub curvature: bool,
 }
 
+/// Fewer points determine no plane.
+const LEAST_NEIGHBOURS: u32 = 3;
+
 /// How a normal is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Method {
     /// Bilinear interpolation between nodes on a grid of cubes: the paper's method.
     #[default]
     Bilinear,
-    /// Principal component analysis of the k nearest neighbours: the paper's ENN.
+    /// Principal component analysis of the k nearest points, the point itself among them: the paper's ENN. The exact
+    /// reference: ten to thirty times as slow.
     Knn,
-    /// Elliptic Gabriel graph and a local quadratic fit: the paper's EGG.
+    /// A quadratic surface through the point's neighbours in the elliptic Gabriel graph, of which the k nearest points
+    /// are considered: the paper's EGG. For clean data of uneven density; noise goes straight into its normals.
     Egg,
 }
 
@@ -76,17 +82,14 @@ impl Options {
                 return Err(Error::Input(format!("cell.size is {}; wanted a finite number above 0", text(size))));
             }
         }
-        if self.k == Some(0) {
-            return Err(Error::Input("k is 0; wanted a whole number of at least 1".into()));
+        if let Some(k) = self.k
+            && k < LEAST_NEIGHBOURS
+        {
+            return Err(Error::input(format_args!("k is {k}; wanted a whole number of at least {LEAST_NEIGHBOURS}")));
         }
         let unsupported = |what: &str, offered: &str| {
             Err(Error::Unsupported(format!("{what} is not in this version; it offers {offered}")))
         };
-        match self.method {
-            Method::Bilinear => {}
-            Method::Knn => return unsupported("method 'knn'", "'bilinear'"),
-            Method::Egg => return unsupported("method 'egg'", "'bilinear'"),
-        }
         match self.orient {
             Orient::None => {}
             Orient::Consistent => return unsupported("orient 'consistent'", "'none'"),

@@ -1,0 +1,66 @@
+//! The paper's baselines: the normal of each point from its own nearest neighbours.
+
+mod egg;
+mod knn;
+mod tree;
+
+use crate::error::Error;
+use crate::normals::Normals;
+use crate::parallel;
+use crate::points::reserve;
+use crate::progress::Stage;
+use glam::Vec3;
+use tree::Search;
+
+pub(crate) use tree::Tree;
+
+/// A task finds about this many neighbours in all: a millisecond.
+const NEIGHBOURS: usize = 1 << 14;
+
+/// Which baseline.
+#[derive(Clone, Copy)]
+pub(crate) enum Baseline {
+    /// The plane of the `k` nearest points, the point itself among them: the paper's ENN.
+    Knn {
+        /// At least 3.
+        k: usize,
+    },
+    /// A quadratic surface through the neighbours in the elliptic Gabriel graph: the paper's EGG.
+    Egg {
+        /// How many points are considered, besides the point itself. At least 3.
+        k: usize,
+    },
+}
+
+/// The normals of `count` points, those that are not in the tree zero; also how many are not zero.
+pub(crate) fn normals(tree: &Tree, baseline: Baseline, count: usize, stage: &Stage) -> Result<(Vec<f32>, u64), Error> {
+    let k = match baseline {
+        Baseline::Knn { k } => k,
+        // The point itself is always found too.
+        Baseline::Egg { k } => k.saturating_add(1),
+    };
+    let k = k.min(tree.places.len());
+    // What the tasks are going to take is refused here, because they cannot.
+    reserve(&mut Vec::<u8>::new(), parallel::threads() * Search::bytes(k), "the neighbours")?;
+
+    let normals = Normals::new(count, tree.places.len())?;
+    let size = (NEIGHBOURS / k.max(1)).clamp(16, 1024);
+    stage.run(tree.places.len().div_ceil(size), &|task| {
+        let mut search = Search::new(tree, k);
+        let mut edges = Vec::new();
+        let mut resolved = 0;
+        for place in &tree.places[parallel::piece(tree.places.len(), size, task)] {
+            let (neighbours, farthest) = search.nearest(place.position);
+            let normal = match baseline {
+                Baseline::Knn { .. } => knn::normal(place.position, neighbours, farthest.sqrt()),
+                Baseline::Egg { .. } => egg::normal(place, neighbours, &mut edges),
+            };
+            resolved += u64::from(normal.is_some());
+            // SAFETY: a point stands in the tree once.
+            unsafe { normals.write(place.point, normal.unwrap_or(Vec3::ZERO)) };
+        }
+        normals.add_resolved(resolved);
+    })?;
+    // SAFETY: the tasks hold every point of the tree.
+    Ok(unsafe { normals.complete() })
+}
