@@ -1,0 +1,29 @@
+// Numbers and tables as text.
+
+export const count = (value) => value.toLocaleString('en');
+export const millions = (value) => (value / 1e6).toFixed(3);
+export const milliseconds = (value) => (value < 10 ? value.toFixed(1) : count(Math.round(value)));
+export const ratio = (value) => value.toFixed(1);
+export const error = (value) => value.toFixed(value < 0.001 ? 5 : 4);
+export const degrees = (value) => `${value.toFixed(value < 10 ? 1 : 0)}°`;
+
+/** A share; small ones keep a digit, so that something is not shown as nothing. */
+export function percent(share) {
+  const value = 100 * share;
+  if (value === 0 || value >= 9.95) return `${value.toFixed(0)} %`;
+  return value < 0.005 ? 'below 0.01 %' : `${value.toFixed(value < 0.095 ? 2 : 1)} %`;
+}
+
+/** From the smallest to the largest, or one of them if they look alike. */
+export function range(values, show) {
+  const [low, high] = [show(Math.min(...values)), show(Math.max(...values))];
+  if (low === high) return low;
+  const unit = low.match(/ %$/)?.[0] ?? '';
+  return `${high.endsWith(unit) && unit ? low.slice(0, -unit.length) : low} to ${high}`;
+}
+
+/** A Markdown table; the first column is text, the others are numbers. */
+export function table(head, rows) {
+  const line = (cells) => `| ${cells.join(' | ')} |`;
+  return [line(head), line(head.map((_, i) => (i === 0 ? '---' : '--:'))), ...rows.map(line)].join('\n');
+}

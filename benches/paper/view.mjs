@@ -1,0 +1,25 @@
+// What takes the pictures: the page's own viewer, and nothing else on the screen. Runs in a browser (pictures.mjs).
+
+import { boundsOf, guessUp } from '../../www/src/bounds.ts';
+import { createViewer } from '../../www/src/viewer.ts';
+
+const viewer = createViewer(document.querySelector('canvas'));
+const frame = () => new Promise(requestAnimationFrame);
+
+async function numbers(file) {
+  const response = await fetch(file);
+  return new Float32Array(await response.arrayBuffer());
+}
+
+/** Shows a cloud, framed. */
+window.showCloud = async ({ positions, normals, origin, shading, pointSize }) => {
+  const cloud = { positions: await numbers(positions) };
+  const bounds = boundsOf(cloud.positions);
+  viewer.show(cloud, bounds, guessUp(bounds, origin));
+  viewer.setNormals(await numbers(normals));
+  viewer.setShading(shading);
+  viewer.setPointSize(pointSize);
+  viewer.fit();
+  await frame();
+  await frame();
+};
