@@ -19,9 +19,11 @@ export const CLASSES = [
 /** Section 3, on Figure 7: how many times faster than EGG. */
 export const FASTER_THAN_EGG = [3, 4];
 
-/** Section 3, on Figure 8: the time hardly changes above the one, the error grows greatly above the other. */
+/** Section 3, on Figure 8, in multiples of L: the time hardly changes from here on, ... */
 export const TIME_SETTLES = 2.0;
+/** ... the error grows greatly from here on, ... */
 export const ERROR_GROWS = 3.0;
+/** ... and this is the advice. */
 export const ADVICE = 1.5;
 
 /** Figure 4. */

@@ -6,9 +6,10 @@ const COLORS = ['#1f5fc4', '#d1541d', '#2a8a4a', '#8a4bb3', '#6b6b6b', '#a8861a'
 
 /**
  * A chart. `x` and `y`: `{ label, log, ticks }`, where `ticks` (values) are optional. `series`: `{ name, points: [[x, y],
- * ...], dashed, color }`, where the number of a colour is optional. Logarithmic axes take positive values only.
+ * ...], style, color }`, where `style` is nothing, 'dashed' or 'dots', and the number of a colour is optional. `band`:
+ * `{ from, to, label }`, a part of the x axis. Logarithmic axes take positive values only.
  */
-export function chart({ title, x, y, series }) {
+export function chart({ title, x, y, series, band }) {
   const axes = [x, y].map((axis, i) => ({
     ...axis,
     ...scale(
@@ -31,23 +32,29 @@ export function chart({ title, x, y, series }) {
       return `${line(PLOT.left, place, PLOT.right, place)}${text(PLOT.left - 8, place + 4, show(tick), 'end')}`;
     }),
   ];
-  const lines = series.map(({ name, points, dashed, color }, i) => {
-    const stroke = COLORS[color ?? i];
-    const dashes = dashed ? ' stroke-dasharray="6 4"' : '';
-    const path = `<polyline points="${points.map(at).join(' ')}" fill="none" stroke="${stroke}" stroke-width="2"${dashes}/>`;
-    const dots = points.map((p) => {
-      const [cx, cy] = at(p).split(',');
-      return `<circle cx="${cx}" cy="${cy}" r="3.2" fill="${dashed ? '#fff' : stroke}" stroke="${stroke}" stroke-width="1.4"/>`;
-    });
+  const lines = series.map(({ name, points, style, color }, i) => {
+    const stroke = `stroke="${COLORS[color ?? i]}" stroke-width="2"${style === 'dashed' ? ' stroke-dasharray="6 4"' : ''}`;
+    const fill = style === 'dashed' ? '#fff' : COLORS[color ?? i];
+    const dot = ([cx, cy]) =>
+      `<circle cx="${cx}" cy="${cy}" r="3.4" fill="${fill}" stroke="${COLORS[color ?? i]}" stroke-width="1.4"/>`;
+    const path = `<polyline points="${points.map(at).join(' ')}" fill="none" ${stroke}/>`;
     const row = PLOT.top + 10 + 24 * i;
-    const sample = `<path d="M${PLOT.right + 16} ${row}h26" stroke="${stroke}" stroke-width="2"${dashes}/>`;
-    return `${path}${dots.join('')}${sample}${text(PLOT.right + 50, row + 4, name)}`;
+    const sample = `<path d="M${PLOT.right + 16} ${row}h26" ${stroke}/>`;
+    return [
+      ...(style === 'dots' ? [] : [path, sample]),
+      ...points.map((point) => dot(at(point).split(','))),
+      dot([PLOT.right + 29, row]),
+      text(PLOT.right + 50, row + 4, name),
+    ].join('');
   });
+  const [from, to] = band ? [round(across(band.from)), round(across(band.to))] : [];
+  const shade = `<rect x="${from}" y="${PLOT.top}" width="${to - from}" height="${PLOT.bottom - PLOT.top}" fill="#f1ead8"/>`;
+  const area = band && [shade, text((from + to) / 2, PLOT.top + 18, band.label, 'middle')].join('');
   return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${WIDTH} ${HEIGHT}" width="${WIDTH}" height="${HEIGHT}" role="img" font-family="system-ui, sans-serif" font-size="13" fill="#222">
 <title>${escape(title)}</title>
 <rect width="${WIDTH}" height="${HEIGHT}" rx="8" fill="#fff"/>
 <text x="${PLOT.left}" y="26" font-size="15" font-weight="600">${escape(title)}</text>
-${[...grid, ...lines].join('\n')}
+${[area, ...grid, ...lines].filter(Boolean).join('\n')}
 <rect x="${PLOT.left}" y="${PLOT.top}" width="${PLOT.right - PLOT.left}" height="${PLOT.bottom - PLOT.top}" fill="none" stroke="#888"/>
 ${text((PLOT.left + PLOT.right) / 2, HEIGHT - 14, x.label, 'middle')}
 <text transform="translate(20 ${middle}) rotate(-90)" text-anchor="middle">${escape(y.label)}</text>

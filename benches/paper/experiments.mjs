@@ -24,16 +24,16 @@ export const FULL = {
   spheres: [187_500, 375_000, 750_000, 1_500_000, 3_000_000],
   freeForm: 712_000,
   sweep: 750_000,
-  factors: [0.3, 0.4, 0.5, 0.75, 1, 1.25, 1.5, 2, 2.5, 3, 4, 5, 6],
+  factors: [0.3, 0.4, 0.5, 0.8, 1, 1.2, 1.5, 2, 2.4, 3, 4, 5, 6],
   leastScan: 100_000,
-  rounds: 5,
+  rounds: 7,
 };
 /** For tests: seconds. */
 export const SMALL = {
   spheres: [93_750, 187_500],
   freeForm: 40_000,
   sweep: 93_750,
-  factors: [0.5, 1, 1.5, 2, 3, 6],
+  factors: [0.4, 0.8, 1, 1.2, 1.5, 2, 2.4, 3, 6],
   leastScan: 1_000,
   rounds: 1,
 };
@@ -143,7 +143,10 @@ function times(reports) {
   };
 }
 
-export const median = (values) => [...values].sort((a, b) => a - b)[values.length >> 1];
+export function median(values) {
+  const ascending = [...values].sort((a, b) => a - b);
+  return (ascending[(values.length - 1) >> 1] + ascending[values.length >> 1]) / 2;
+}
 
 /** The exponent of the power law that fits some (x, y) best on logarithmic axes: 1 is linear. */
 export function exponent(pairs) {

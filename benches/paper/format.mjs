@@ -7,11 +7,13 @@ export const ratio = (value) => value.toFixed(1);
 export const error = (value) => value.toFixed(value < 0.001 ? 5 : 4);
 export const degrees = (value) => `${value.toFixed(value < 10 ? 1 : 0)}°`;
 
-/** A share; small ones keep a digit, so that something is not shown as nothing. */
+/** A share, with a digit more close to nothing and to all, so that these are told from nothing and from all. */
 export function percent(share) {
   const value = 100 * share;
-  if (value === 0 || value >= 9.95) return `${value.toFixed(0)} %`;
-  return value < 0.005 ? 'below 0.01 %' : `${value.toFixed(value < 0.095 ? 2 : 1)} %`;
+  if (value === 0 || value === 100) return `${value} %`;
+  if (value < 0.005) return 'below 0.01 %';
+  const digits = value < 0.095 ? 2 : value < 9.95 || value >= 99.5 ? 1 : 0;
+  return `${value.toFixed(digits)} %`;
 }
 
 /** From the smallest to the largest, or one of them if they look alike. */

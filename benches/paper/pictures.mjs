@@ -36,7 +36,7 @@ export async function takePictures(estimator, { plan, scans, folder, tell }) {
   const server = await serve(FOLDER);
   const browser = await chromium.launch({ executablePath, args: ['--no-sandbox', '--disable-background-networking'] });
   try {
-    const page = await browser.newPage();
+    const page = await browser.newPage({ reducedMotion: 'reduce' });
     await page.goto(server.url);
     await page.addScriptTag({ url: 'view.js', type: 'module' });
     await page.waitForFunction(() => 'showCloud' in window);
@@ -51,56 +51,74 @@ export async function takePictures(estimator, { plan, scans, folder, tell }) {
 async function takeAll(camera, plan, scans) {
   const groups = { spheres: [], surface: [], detail: [], scans: [] };
   for (const points of plan.spheres) {
-    await show(camera, sphere(points), '1.0 L', { size: [240, 240] });
+    await show(camera, sphere(points), '1.0 L', { size: [240, 240], pointSize: 1.4 });
     groups.spheres.push(await take(camera, `sphere-${points}`, `${points / 1e6} M`));
   }
 
   const { positions } = freeForm(plan.freeForm);
-  const view = { size: [640, 400], pointSize: 0.8 };
-  for (const [variant, file, title] of [
-    ['0.4 L', 'ours', '0.4 L'],
-    ['1.0 L', 'ours-1', '1.0 L'],
-    ['knn', 'enn', 'ENN'],
+  const whole = { size: [640, 420], closer: 1.6, at: [0.54, 0.74] };
+  // Where ridge, groove and ripples meet.
+  const detail = { size: [640, 420], closer: 3, at: [0.485, 0.58] };
+  const normals = { title: 'their normals, turned upwards: x, y, z as red, green, blue', shading: 'normals' };
+  for (const [group, variant, view] of [
+    ['surface', '0.4 L', whole],
+    ['surface', '0.4 L', { ...whole, ...normals }],
+    ['surface', 'knn', whole],
+    ['detail', '0.4 L', detail],
+    ['detail', '1.0 L', detail],
+    ['detail', 'knn', detail],
   ]) {
     await show(camera, positions, variant, view);
-    if (variant !== '1.0 L') groups.surface.push(await take(camera, `surface-${file}`, title));
-    await zoom(camera, [380, 150], 5);
-    groups.detail.push(await take(camera, `detail-${file}`, title));
+    const title = view.title ?? (variant === 'knn' ? 'ENN' : variant);
+    groups[group].push(await take(camera, `${group}-${groups[group].length + 1}`, title));
   }
-  await show(camera, positions, '0.4 L', { ...view, shading: 'normals' });
-  groups.surface.splice(1, 0, await take(camera, 'surface-normals', 'its normals: x, y, z as red, green, blue'));
 
-  for (const { name, title, positions, origin } of scans.filter(({ title }) => title)) {
-    await show(camera, positions, '0.4 L', { size: [480, 360], origin });
+  for (const { name, title, positions, origin, view } of scans.filter(({ title }) => title)) {
+    await show(camera, positions, '0.4 L', { size: [480, 360], origin, ...view });
     groups.scans.push(await take(camera, name, title));
   }
   return groups;
 }
 
-/** Puts a cloud with its normals before the camera. */
+/**
+ * Puts a cloud with its normals before the camera: `turn`ed by degrees to the right and down, then so many times
+ * `closer` to a place `at` the picture (shares of its sides).
+ */
 async function show({ estimator, page }, positions, variant, view) {
-  const { size, shading = 'shaded', pointSize = 1, origin = [0, 0, 0] } = view;
+  const { size, shading = 'shaded', pointSize = 1, origin = [0, 0, 0], up, turn, closer, at = [0.5, 0.5] } = view;
   const { normals } = await estimator.estimateNormals(positions, VARIANTS[variant]);
+  if (shading === 'normals') turnUpwards(normals);
   writeFileSync(join(FOLDER, 'positions'), positions);
   writeFileSync(join(FOLDER, 'normals'), normals);
-  await page.setViewportSize({ width: size[0], height: size[1] });
+  const [width, height] = size;
+  await page.setViewportSize({ width, height });
   await page.evaluate((cloud) => window.showCloud(cloud), {
     positions: 'positions',
     normals: 'normals',
     origin,
+    up,
     shading,
     pointSize,
   });
+  const place = [at[0] * width, at[1] * height];
+  await page.mouse.move(...place);
+  if (turn) {
+    await page.mouse.down();
+    // A drag over the height of the view is a full turn.
+    await page.mouse.move(...place.map((start, axis) => start + (turn[axis] / 360) * height), { steps: 4 });
+    await page.mouse.up();
+    await page.mouse.move(...place);
+  }
+  // What OrbitControls makes of a wheel.
+  if (closer) await page.mouse.wheel(0, (100 * Math.log(closer)) / Math.log(0.95));
+  // A view in motion is drawn in part.
+  if (turn || closer) await page.waitForTimeout(1500);
 }
 
-/** Turns the wheel over a place of the picture, and waits for the view to come to rest. */
-async function zoom({ page }, [x, y], turns) {
-  await page.mouse.move(x, y);
-  for (let turn = 0; turn < turns; turn++) {
-    await page.mouse.wheel(0, -240);
-    await page.waitForTimeout(50);
+function turnUpwards(normals) {
+  for (let at = 0; at < normals.length; at += 3) {
+    if (normals[at + 2] < 0) for (let axis = 0; axis < 3; axis++) normals[at + axis] *= -1;
   }
-  await page.waitForTimeout(1500);
 }
 
 /** Saves what is seen, in the best quality that is small enough. */

@@ -3,36 +3,38 @@
 import * as article from './article.mjs';
 import { chart } from './chart.mjs';
 import { BAR, bar, claims, compared, ratios } from './claims.mjs';
-import { CLASSED, OURS, median } from './experiments.mjs';
+import { CLASSED, OURS, VARIANTS, median } from './experiments.mjs';
 import { count, degrees, error, milliseconds, millions, percent, range, ratio, table } from './format.mjs';
 import { WRONG } from './deviation.mjs';
 
 const BASELINES = { knn: 'ENN', egg: 'EGG' };
+/** What the paper calls 1.0 L, by the cubes that it counts. */
+const PRINTED_SCALE = article.scaleOf(article.FREE_FORM);
 const label = (variant) => BASELINES[variant] ?? variant;
 const paragraphs = (...parts) => parts.filter(Boolean).join('\n\n');
 const image = ({ file, title }) => `![${title}](paper/${file})`;
 
 /** The charts, `{ name: SVG }`. */
 export function charts({ spheres, scans, sweep }) {
-  const compare = (clouds, color) => (variant, name) => ({
+  const axes = { x: { label: 'points', log: true }, y: { label: 'milliseconds', log: true } };
+  const curves = (clouds, style) =>
+    [
+      ['1.0 L', 'this package, 1.0 L'],
+      ['0.4 L', 'this package, 0.4 L'],
+      ['knn', 'ENN, k = 16'],
+      ['egg', 'EGG, k = 8'],
+    ].map(([variant, name]) => ({
+      name,
+      style,
+      points: clouds.map(({ points, methods }) => [points, methods[variant].module]),
+    }));
+  const printed = (key, name) => ({
     name,
-    color,
-    points: clouds.map(({ points, methods }) => [points, methods[variant].module]),
-  });
-  const curves = (clouds) => [
-    compare(clouds, 0)('1.0 L', 'this package, 1.0 L'),
-    compare(clouds, 4)('0.4 L', 'this package, 0.4 L'),
-    compare(clouds, 1)('knn', 'ENN, k = 16'),
-    compare(clouds, 2)('egg', 'EGG, k = 8'),
-  ];
-  const printed = (key, name, color) => ({
-    name,
-    color,
-    dashed: true,
+    style: 'dashed',
     points: article.TABLE.map((row) => [row.points, row[key]]),
   });
-  const axes = { x: { label: 'points', log: true }, y: { label: 'milliseconds', log: true } };
   const factors = { label: 'edge of the cubes in multiples of L', log: true, ticks: [0.3, 0.5, 1, 1.5, 2, 3, 4, 6] };
+  const band = { from: PRINTED_SCALE, to: 3 * PRINTED_SCALE, label: 'its “1.0 to 3.0 L”' };
   const steps = (clouds, value) =>
     clouds.map(({ name, points, steps }) => ({
       name,
@@ -44,7 +46,7 @@ export function charts({ spheres, scans, sweep }) {
       'time-scans': chart({
         title: 'Time against points: scans',
         ...axes,
-        series: [...curves(scans), printed('one', 'paper, “1.0 L”, i5', 3), printed('egg', 'paper, EGG, i5', 5)],
+        series: [...curves(scans, 'dots'), printed('one', 'paper, “1.0 L”, i5'), printed('egg', 'paper, EGG, i5')],
       }),
     }),
     'time-edge': chart({
@@ -52,6 +54,7 @@ export function charts({ spheres, scans, sweep }) {
       x: factors,
       y: { label: 'nanoseconds a point' },
       series: steps(sweep, ({ module }, points) => (1e6 * module) / points),
+      band,
     }),
     'error-edge': chart({
       title: 'Mean deviation against the edge of the cubes',
@@ -61,6 +64,7 @@ export function charts({ spheres, scans, sweep }) {
         sweep.filter(({ steps }) => steps[0].error),
         ({ error }) => error.mean,
       ),
+      band,
     }),
   };
 }
@@ -141,17 +145,34 @@ function measuredBar(rows) {
         range(egg.totals, ratio),
       ]),
     ),
-    'The last two columns compare what the caller waits for, copies into the worker and out of it included.',
+    `The last two columns compare what the caller waits for, copies into the worker and out of it included. The two bars stand apart, the two baselines do not: EGG takes ${range(ratios(compared(rows), 'egg', 'knn'), (value) => value.toFixed(2))} times as long as ENN.`,
   );
 }
 
+/** Who leaves points without a normal. */
+function without(clouds) {
+  const missing = Object.keys(VARIANTS).map((variant) => {
+    const shares = clouds.map(({ methods }) => methods[variant].unresolved / methods[variant].points);
+    return shares.some((share) => share > 0) && `${label(variant)} ${range(shares, percent)}`;
+  });
+  const named = missing.filter(Boolean).join(', ');
+  return named
+    ? `Points that get no normal, where errors are counted as right angles: ${named}.`
+    : 'Every point gets a normal.';
+}
+
 function spheres({ spheres }, pictures) {
+  const medians = (variant) =>
+    range(
+      spheres.map(({ methods }) => methods[variant].error.median),
+      error,
+    );
   const variants = [...OURS, 'knn', 'egg'];
   const time = (row, variant) => milliseconds(row.methods[variant].module);
   const errors = ({ mean, rms, worst }) => `${error(mean)}, ${error(rms)}, ${degrees(worst)}`;
   const wrong = spheres.map(({ methods }) => methods.egg.error.wrong);
   return paragraphs(
-    pictures && strip(pictures.spheres, 'at 1.0 L'),
+    pictures && strip(pictures.spheres, 'Normals at 1.0 L.'),
     '![Time against points](paper/time-spheres.svg)',
     table(
       ['points', ...variants.map(label), 'ENN / 1.0 L', 'EGG / 1.0 L', 'ENN / 1.5 L', 'EGG / 1.5 L'],
@@ -174,16 +195,7 @@ function spheres({ spheres }, pictures) {
       ['points', ...variants.map(label)],
       spheres.map((row) => [row.name, ...variants.map((variant) => errors(row.methods[variant].error))]),
     ),
-    `EGG’s few neighbours sometimes leave its quadratic surface open: ${range(wrong, percent)} of its normals are off by more than ${WRONG} degrees, and half are off by less than ${range(
-      spheres.map(({ methods }) => methods.egg.error.median),
-      error,
-    )} (ENN: ${range(
-      spheres.map(({ methods }) => methods.knn.error.median),
-      error,
-    )}, 1.0 L: ${range(
-      spheres.map(({ methods }) => methods['1.0 L'].error.median),
-      error,
-    )}).`,
+    `The median is ${medians('1.0 L')} at 1.0 L, ${medians('knn')} by ENN and ${medians('egg')} by EGG, which has ${range(wrong, percent)} of its normals off by more than ${WRONG} degrees. ${without(spheres)}`,
   );
 }
 
@@ -210,7 +222,8 @@ function nodes({ spheres }) {
   );
 }
 
-function surface({ freeForm: { points, methods } }, pictures) {
+function surface({ freeForm }, pictures) {
+  const { points, methods } = freeForm;
   const { grid, cells, milliseconds: time, interpolation, enn } = article.FREE_FORM;
   const cubes = (grid) => `${grid.map(count).join(' × ')}`;
   const rest = ({ module, phases }) => milliseconds(module - phases.interpolation);
@@ -230,7 +243,7 @@ function surface({ freeForm: { points, methods } }, pictures) {
   };
   return paragraphs(
     pictures && strip(pictures.surface, ''),
-    pictures && strip(pictures.detail, 'the ridge from near'),
+    pictures && strip(pictures.detail, 'Where ridge, groove and ripples meet. The paper’s Figures 4a and 4c, and 4d.'),
     `${count(points)} points on a generated surface with a ridge, a steep edge, a groove and ripples, its box as that of the paper’s.`,
     table(
       [
@@ -264,7 +277,7 @@ function surface({ freeForm: { points, methods } }, pictures) {
         ...[...OURS, 'knn', 'egg'].map(facts),
       ],
     ),
-    `With the number of cubes that the paper counts (about 0.4 L by its Eq. 1) ridges and ripples are kept; at 1.0 L ${percent(methods['1.0 L'].error.wrong)} of the normals are off by more than ${WRONG} degrees, at 0.4 L ${percent(methods['0.4 L'].error.wrong)}, by ENN ${percent(methods.knn.error.wrong)}. The ridge is a true edge, where any plane is wrong.`,
+    `Of the normals ${percent(methods['1.0 L'].error.wrong)} are off by more than ${WRONG} degrees at 1.0 L, ${percent(methods['0.4 L'].error.wrong)} at 0.4 L, which is about the cubes that the paper counts, and ${percent(methods.knn.error.wrong)} by ENN. The ridge is a true edge: on it no plane is right. ${without([freeForm])}`,
   );
 }
 
@@ -287,7 +300,7 @@ function edge({ sweep }) {
         ]),
       ]),
     ),
-    `The paper’s curve goes from 1.0 to 3.0 L. If its L is the one of its cube counts, that is ${range([0.4, 1.2], (value) => value.toFixed(1))} L of Eq. 1, and its advice, ${article.ADVICE} L, is ${(0.4 * article.ADVICE).toFixed(1)} L.`,
+    `The sphere has ${millions(sweep[0].points)} million points. The paper’s curves go from 1.0 to 3.0 L. By the cubes that it counts that is ${PRINTED_SCALE.toFixed(1)} to ${(3 * PRINTED_SCALE).toFixed(1)} L of its Eq. 1 (shaded), and its advice, ${article.ADVICE} L, is ${(article.ADVICE * PRINTED_SCALE).toFixed(1)} L.`,
   );
 }
 
@@ -327,7 +340,7 @@ function scans({ scans }, { pictures, skipped, hasFolder }) {
     return paragraphs(`Skipped: no scans; ${why}.`, left(skipped));
   }
   return paragraphs(
-    pictures?.scans.length && strip(pictures.scans, 'at 0.4 L'),
+    pictures?.scans.length && strip(pictures.scans, 'Normals at 0.4 L.'),
     '![Time against points](paper/time-scans.svg)',
     table(
       [
@@ -346,7 +359,8 @@ function scans({ scans }, { pictures, skipped, hasFolder }) {
       ],
       [...printed, ...ours],
     ),
-    'Nodes, cubes and occupied cubes are those at 1.0 L. The paper’s times stand in the columns by its own names; its ratio is that of its own columns.',
+    'Nodes, cubes and occupied cubes are those at 1.0 L. The paper’s times stand in the columns by its own names; its ratio is that of its own columns. ' +
+      without(scans),
     `The scans:\n\n${scans.map(({ name, about }) => `- ${name}${about ? `: ${about}` : ''}`).join('\n')}`,
     left(skipped),
   );

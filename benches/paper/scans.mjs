@@ -4,19 +4,40 @@ import { readFileSync, readdirSync } from 'node:fs';
 import { join } from 'node:path';
 import { gunzipSync } from 'node:zlib';
 
-/** Of scans that are met often: what they are, and whom they are owed to. Pictures are taken of these only. */
+/** Of scans that are met often: what they are, and whom they are owed to. Pictures are taken of those with a title. */
 const KNOWN = {
-  las_ahn3_cropped: { about: 'aerial lidar; AHN3, CC0', title: 'a village from the air' },
-  las_indoor: { about: 'rooms, lidar; loaders.gl, MIT', title: 'rooms' },
-  las_autzen_trim: { about: 'aerial lidar; PDAL, BSD', title: 'woods from the air' },
+  las_ahn3_cropped: {
+    about: 'aerial lidar; AHN3, CC0',
+    title: 'a village from the air',
+    view: { size: [640, 420], closer: 1.15, pointSize: 0.6 },
+  },
+  las_indoor: {
+    about: 'rooms, lidar; loaders.gl, MIT',
+    title: 'rooms, from outside',
+    view: { closer: 1.1, pointSize: 0.7 },
+  },
+  las_autzen_trim: {
+    about: 'aerial lidar; PDAL, BSD',
+    title: 'a river and woods from the air',
+    view: { closer: 1.1, pointSize: 0.5 },
+  },
   stanford_bunny_ranges_merged_normals: {
     about: 'ten range scans of the Stanford bunny; Stanford Computer Graphics Laboratory',
     title: 'the bunny, ten range scans',
+    view: { closer: 1.2 },
   },
-  potree_lion_takanawa_normals_be: { about: 'photogrammetry of a statue; potree, BSD', title: 'a lion' },
+  potree_lion_takanawa_normals_be: {
+    about: 'photogrammetry of a statue; potree, BSD',
+    title: 'a lion',
+    view: { up: 'z', closer: 1.4, pointSize: 0.6 },
+  },
   igea: { about: 'vertices of a scanned head; Cyberware, from common-3d-test-models' },
-  cilantro_frame_1: { about: 'one frame of a depth camera; cilantro, MIT', title: 'a desk' },
-  cgal_building: { about: 'a building; CGAL', title: 'a building' },
+  cilantro_frame_1: { about: 'a frame of a depth camera; cilantro, MIT' },
+  cgal_building: {
+    about: 'a building; CGAL',
+    title: 'a building',
+    view: { up: 'z', turn: [-50, 0], closer: 1.1, pointSize: 0.8 },
+  },
 };
 
 /** Gaussian splats are no surface points. */

@@ -12,10 +12,10 @@ async function numbers(file) {
 }
 
 /** Shows a cloud, framed. */
-window.showCloud = async ({ positions, normals, origin, shading, pointSize }) => {
+window.showCloud = async ({ positions, normals, origin, up, shading, pointSize }) => {
   const cloud = { positions: await numbers(positions) };
   const bounds = boundsOf(cloud.positions);
-  viewer.show(cloud, bounds, guessUp(bounds, origin));
+  viewer.show(cloud, bounds, up ?? guessUp(bounds, origin));
   viewer.setNormals(await numbers(normals));
   viewer.setShading(shading);
   viewer.setPointSize(pointSize);
