@@ -87,7 +87,9 @@ impl Tree {
         let done = |level: u32| f64::from(level) / f64::from(levels.max(1));
         for level in 0..top {
             // SAFETY: the nodes of a level share no point.
-            stage.part(done(level)..done(level + 1)).run(1 << level, &|number| unsafe { shared.split(level, number) })?;
+            stage
+                .part(done(level)..done(level + 1))
+                .run(1 << level, &|number| unsafe { shared.split(level, number) })?;
         }
         // SAFETY: nor do the subtrees below them.
         stage.part(done(top)..1.0).run(1 << top, &|number| unsafe { shared.split_below(top, number, levels) })
@@ -246,6 +248,49 @@ impl<'a> Search<'a> {
             self.found.select_nth_unstable_by_key(self.k - 1, Neighbour::order);
             self.found.truncate(self.k);
         }
-        self.found.iter().fold(0.0, |farthest, neighbour| if neighbour.distance > farthest { neighbour.distance } else { farthest })
+        self.found
+            .iter()
+            .fold(0.0, |farthest, neighbour| if neighbour.distance > farthest { neighbour.distance } else { farthest })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::progress::Progress;
+
+    /// The same points as by sorting all of them, whatever ties there are.
+    #[test]
+    fn the_nearest_are_those_of_the_definition() {
+        let mut state = 1u64;
+        let mut random = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 40) as f32 / (1 << 23) as f32 - 1.0
+        };
+        let volume: Vec<f32> = (0..3000).map(|_| random()).collect();
+        let mut uneven: Vec<f32> = (0..3000).map(|_| random().powi(9)).collect();
+        uneven.extend([1e38, f32::NAN, 0.0, -1e38, 0.0, f32::INFINITY, 3e38, 3e38, 3e38]);
+        let grid = (0..1000).flat_map(|i| [i % 10, i / 10 % 10, i / 100].map(|c| c as f32)).collect();
+        let equal = [1.0, 2.0, 3.0].repeat(100);
+        for (name, coordinates) in [("volume", volume), ("uneven", uneven), ("grid", grid), ("equal", equal)] {
+            let points = Points::from_f32(&coordinates).unwrap();
+            let (bounds, bulk) = (Bounds::of(&points), Bulk::of(points.len(), &|i| points.positions[i].as_dvec3()));
+            let progress = Progress::silent();
+            let tree = Tree::build(&points, &bounds, &bulk, &progress.stage("tree", 0.0..1.0)).unwrap();
+            for k in [1, 3, 8, 50, tree.places.len()] {
+                let mut search = Search::new(&tree, k);
+                for query in tree.places.iter().step_by(7) {
+                    let distance = |place: &Place| query.position.distance_squared(place.position);
+                    let mut expected: Vec<(f32, u32)> = tree.places.iter().map(|p| (distance(p), p.point)).collect();
+                    expected.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                    expected.truncate(k);
+                    let (found, farthest) = search.nearest(query.position);
+                    found.sort_unstable_by_key(Neighbour::order);
+                    let found: Vec<(f32, u32)> = found.iter().map(|n| (n.distance, n.point)).collect();
+                    assert_eq!(found, expected, "{name} {k}");
+                    assert_eq!(farthest, expected[k - 1].0, "{name} {k}");
+                }
+            }
+        }
     }
 }
