@@ -27,21 +27,37 @@ const COEFFICIENTS: usize = 5;
 const LEAST_PIVOT: f64 = 1e-3;
 
 /// The normal at a point from its nearest neighbours, among which it may be itself; `None` if they lie on a line.
-pub(super) fn normal(point: &Place, nearest: &mut [Neighbour], edges: &mut Vec<DVec3>) -> Option<Vec3> {
-    nearest.sort_unstable_by_key(Neighbour::order);
-    let others = nearest.iter().filter(|neighbour| neighbour.point != point.point);
-    let farthest = others.clone().next_back()?.position - point.position;
+pub(super) fn normal(
+    places: &[Place],
+    point: usize,
+    nearest: &mut [Neighbour],
+    edges: &mut Vec<DVec3>,
+) -> Option<Vec3> {
+    sort(nearest);
+    let others = nearest.iter().map(|neighbour| neighbour.place as usize).filter(|place| *place != point);
+    let relative = |place: usize| (places[place].position - places[point].position);
+    let farthest = relative(others.clone().next_back()?);
     // Units of this length are what moments are made for.
     let scale = 1.0 / farthest.as_dvec3().length();
     if !scale.is_finite() {
         return None;
     }
     edges.clear();
-    edges.extend(others.map(|other| (other.position - point.position).as_dvec3() * scale));
+    edges.extend(others.map(|other| relative(other).as_dvec3() * scale));
     let candidates = edges.iter().map(|edge| edge.as_vec3());
     let (_, plane) = Moments::of(candidates.chain([Vec3::ZERO])).plane()?;
     keep_edges(edges, ALPHA);
     Some(quadratic(plane.as_dvec3(), edges).map_or(plane, DVec3::as_vec3))
+}
+
+/// Sorts by distance. By insertion: there are few, and the graph takes as many steps.
+fn sort(nearest: &mut [Neighbour]) {
+    for end in 1..nearest.len() {
+        let neighbour = nearest[end];
+        let place = nearest[..end].iter().rposition(|before| before.order < neighbour.order).map_or(0, |i| i + 1);
+        nearest.copy_within(place..end, place + 1);
+        nearest[place] = neighbour;
+    }
 }
 
 /// Of some points relative to the origin, in the order of their distances, keeps the origin's neighbours in the graph.

@@ -6,6 +6,7 @@
 //! searching", 1975; distances to regions grow step by step as in Arya and Mount, "Algorithms for fast vector
 //! quantization", 1993.
 
+use super::select::select;
 use crate::error::Error;
 use crate::parallel::Scatter;
 use crate::points::{Bounds, Bulk, Points, reserve};
@@ -37,6 +38,15 @@ impl Place {
     #[inline(always)]
     fn along(&self, axis: u32) -> f32 {
         AsRef::<[f32; 3]>::as_ref(&self.position)[axis as usize]
+    }
+
+    /// In the order of a coordinate; of two at one, in that of the input.
+    #[inline(always)]
+    fn order(&self, axis: u32) -> u64 {
+        let bits = self.along(axis).to_bits();
+        // The bits of numbers above zero have their order, those below it the opposite one.
+        let order = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
+        u64::from(order) << 32 | u64::from(self.point)
     }
 }
 
@@ -94,10 +104,6 @@ impl Tree {
         // SAFETY: nor do the subtrees below them.
         stage.part(done(top)..1.0).run(1 << top, &|number| unsafe { shared.split_below(top, number, levels) })
     }
-
-    fn leaf(&self, node: usize) -> &[Place] {
-        &self.places[range(self.places.len(), self.levels, node - (1 << self.levels))]
-    }
 }
 
 /// The points of a node.
@@ -125,10 +131,8 @@ impl Shared<'_> {
         // SAFETY: the caller's promise.
         let (places, split) = unsafe { (self.places.slice(range), &mut self.splits.slice(node..node + 1)[0]) };
         let axis = longest_side(places);
-        // The number of the point makes the order total: one result, whatever the method.
-        let order = |a: &Place, b: &Place| a.along(axis).total_cmp(&b.along(axis)).then(a.point.cmp(&b.point));
-        let (_, place, _) = places.select_nth_unstable_by(middle, order);
-        *split = Split { axis, value: place.along(axis) };
+        select(places, middle, |place| place.order(axis));
+        *split = Split { axis, value: places[middle].along(axis) };
     }
 
     /// # Safety
@@ -157,18 +161,22 @@ fn longest_side(places: &[Place]) -> u32 {
 /// One of the nearest points.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Neighbour {
-    /// Squared, in single precision.
-    pub distance: f32,
-    /// Which point of the input it is.
-    pub point: u32,
-    pub position: Vec3,
+    /// The squared distance in single precision, then the number of the point: in the order of distance, and of two at
+    /// one distance the one that comes first in the input. No distance is negative, so its bits have its order.
+    pub order: u64,
+    /// Among [`Tree::places`].
+    pub place: u32,
 }
 
 impl Neighbour {
-    /// In the order of distance; of two at one distance the one that comes first in the input. No distance is negative,
-    /// so its bits have its order.
-    pub fn order(&self) -> u64 {
-        u64::from(self.distance.to_bits()) << 32 | u64::from(self.point)
+    #[inline(always)]
+    fn new(distance: f32, point: u32, place: usize) -> Self {
+        Self { order: u64::from(distance.to_bits()) << 32 | u64::from(point), place: place as u32 }
+    }
+
+    /// Squared.
+    pub fn distance(&self) -> f32 {
+        f32::from_bits((self.order >> 32) as u32)
     }
 }
 
@@ -226,14 +234,15 @@ impl<'a> Search<'a> {
                 self.ahead.push((2 * node + 1 - is_second, offset));
                 node = 2 * node + is_second;
             }
-            for place in self.tree.leaf(node) {
-                let distance = query.distance_squared(place.position);
+            let places = range(self.tree.places.len(), self.tree.levels, node - self.tree.splits.len());
+            for place in places {
+                let Place { position, point } = self.tree.places[place];
+                let distance = query.distance_squared(position);
                 if distance <= bound {
                     if self.found.len() == most(self.k) {
                         bound = self.keep_nearest();
                     }
-                    let Place { position, point } = *place;
-                    self.found.push(Neighbour { distance, point, position });
+                    self.found.push(Neighbour::new(distance, point, place));
                 }
             }
         }
@@ -245,12 +254,11 @@ impl<'a> Search<'a> {
     /// Throws all but the nearest k away, and answers the squared distance of the farthest of them.
     fn keep_nearest(&mut self) -> f32 {
         if self.found.len() > self.k {
-            self.found.select_nth_unstable_by_key(self.k - 1, Neighbour::order);
+            select(&mut self.found, self.k - 1, |neighbour| neighbour.order);
             self.found.truncate(self.k);
         }
-        self.found
-            .iter()
-            .fold(0.0, |farthest, neighbour| if neighbour.distance > farthest { neighbour.distance } else { farthest })
+        let farthest = self.found.iter().map(|neighbour| neighbour.order).max();
+        farthest.map_or(0.0, |order| f32::from_bits((order >> 32) as u32))
     }
 }
 
@@ -285,8 +293,8 @@ mod tests {
                     expected.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
                     expected.truncate(k);
                     let (found, farthest) = search.nearest(query.position);
-                    found.sort_unstable_by_key(Neighbour::order);
-                    let found: Vec<(f32, u32)> = found.iter().map(|n| (n.distance, n.point)).collect();
+                    found.sort_unstable_by_key(|neighbour| neighbour.order);
+                    let found: Vec<(f32, u32)> = found.iter().map(|n| (n.distance(), n.order as u32)).collect();
                     assert_eq!(found, expected, "{name} {k}");
                     assert_eq!(farthest, expected[k - 1].0, "{name} {k}");
                 }
