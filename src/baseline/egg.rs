@@ -35,7 +35,7 @@ pub(super) fn normal(
 ) -> Option<Vec3> {
     sort(nearest);
     let others = nearest.iter().map(|neighbour| neighbour.place as usize).filter(|place| *place != point);
-    let relative = |place: usize| (places[place].position - places[point].position);
+    let relative = |place: usize| places[place].position - places[point].position;
     let farthest = relative(others.clone().next_back()?);
     // Units of this length are what moments are made for.
     let scale = 1.0 / farthest.as_dvec3().length();

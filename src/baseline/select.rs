@@ -15,7 +15,7 @@ pub(super) fn select<T: Copy>(items: &mut [T], nth: usize, key: impl Fn(&T) -> u
         let last = items.len() - 1;
         let mut random = || {
             seed = seed.wrapping_mul(0x9E37_79B9).wrapping_add(0x7F4A_7C15);
-            (u64::from(seed) * items.len() as u64 >> 32) as usize
+            ((u64::from(seed) * items.len() as u64) >> 32) as usize
         };
         let (a, b, c) = (random(), random(), random());
         let (low, high) = if key(&items[a]) < key(&items[b]) { (a, b) } else { (b, a) };
@@ -30,10 +30,9 @@ pub(super) fn select<T: Copy>(items: &mut [T], nth: usize, key: impl Fn(&T) -> u
         let pivot = key(&items[last]);
         let mut smaller = 0;
         for i in 0..last {
-            let item = items[i];
-            items[i] = items[smaller];
-            items[smaller] = item;
-            smaller += usize::from(key(&item) < pivot);
+            let is_smaller = key(&items[i]) < pivot;
+            items.swap(i, smaller);
+            smaller += usize::from(is_smaller);
         }
         items.swap(smaller, last);
         match nth.cmp(&smaller) {

@@ -175,7 +175,7 @@ impl Neighbour {
     }
 
     /// Squared.
-    pub fn distance(&self) -> f32 {
+    fn distance(&self) -> f32 {
         f32::from_bits((self.order >> 32) as u32)
     }
 }
@@ -213,6 +213,7 @@ impl<'a> Search<'a> {
     ///
     /// Exact for distances in single precision: rounding is monotone, so what lies beyond a plane is never computed to
     /// be nearer than the plane.
+    #[inline(never)] // Alone it keeps more in registers: 0.93 of the time.
     pub fn nearest(&mut self, query: Vec3) -> (&mut [Neighbour], f32) {
         let (before, radius) = self.before;
         let radius = radius + query.distance(before);
@@ -252,13 +253,13 @@ impl<'a> Search<'a> {
     }
 
     /// Throws all but the nearest k away, and answers the squared distance of the farthest of them.
+    #[inline(never)] // It is called in two places.
     fn keep_nearest(&mut self) -> f32 {
         if self.found.len() > self.k {
             select(&mut self.found, self.k - 1, |neighbour| neighbour.order);
             self.found.truncate(self.k);
         }
-        let farthest = self.found.iter().map(|neighbour| neighbour.order).max();
-        farthest.map_or(0.0, |order| f32::from_bits((order >> 32) as u32))
+        self.found.iter().max_by_key(|neighbour| neighbour.order).map_or(0.0, Neighbour::distance)
     }
 }
 
