@@ -246,9 +246,11 @@ fn options_out_of_range_are_refused_with_what_was_wanted() {
         let (unsupported, text) = text(Options { cell, ..Options::default() });
         assert!(!unsupported && text.contains("wanted"), "{text}");
     }
+    for k in 0..3 {
+        let (unsupported, text) = text(Options { method: Method::Knn, k: Some(k), ..Options::default() });
+        assert!(!unsupported && text.contains("wanted a whole number of at least 3"), "{text}");
+    }
     for options in [
-        Options { method: Method::Knn, ..Options::default() },
-        Options { method: Method::Egg, ..Options::default() },
         Options { orient: Orient::Consistent, ..Options::default() },
         Options { orient: Orient::Outward, ..Options::default() },
         Options { orient: Orient::Viewpoint([0.0; 3]), ..Options::default() },

@@ -2,6 +2,7 @@
 
 mod egg;
 mod knn;
+mod select;
 mod tree;
 
 use crate::error::Error;
@@ -49,15 +50,15 @@ pub(crate) fn normals(tree: &Tree, baseline: Baseline, count: usize, stage: &Sta
         let mut search = Search::new(tree, k);
         let mut edges = Vec::new();
         let mut resolved = 0;
-        for place in &tree.places[parallel::piece(tree.places.len(), size, task)] {
-            let (neighbours, farthest) = search.nearest(place.position);
+        for place in parallel::piece(tree.places.len(), size, task) {
+            let (neighbours, farthest) = search.nearest(tree.places[place].position);
             let normal = match baseline {
-                Baseline::Knn { .. } => knn::normal(place.position, neighbours, farthest.sqrt()),
-                Baseline::Egg { .. } => egg::normal(place, neighbours, &mut edges),
+                Baseline::Knn { .. } => knn::normal(&tree.places, place, neighbours, farthest.sqrt()),
+                Baseline::Egg { .. } => egg::normal(&tree.places, place, neighbours, &mut edges),
             };
             resolved += u64::from(normal.is_some());
             // SAFETY: a point stands in the tree once.
-            unsafe { normals.write(place.point, normal.unwrap_or(Vec3::ZERO)) };
+            unsafe { normals.write(tree.places[place].point, normal.unwrap_or(Vec3::ZERO)) };
         }
         normals.add_resolved(resolved);
     })?;

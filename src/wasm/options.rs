@@ -32,7 +32,7 @@ pub(super) fn parse(value: &JsValue) -> Result<Options, Error> {
         options.cell = self::cell(&cell).ok_or_else(|| refusal("cell", &cell, CELLS))?;
     }
     if let Some(k) = given(value, "k") {
-        options.k = Some(self::k(&k).ok_or_else(|| refusal("k", &k, "a whole number of at least 1"))?);
+        options.k = Some(self::k(&k).ok_or_else(|| refusal("k", &k, "a whole number of at least 3"))?);
     }
     if let Some(orient) = given(value, "orient") {
         options.orient = self::orient(&orient).ok_or_else(|| refusal("orient", &orient, ORIENTS))?;
