@@ -10,7 +10,7 @@ export const BAR = { knn: 10, egg: 20 };
 /** All clouds whose methods were compared, in the order of the report. */
 export const compared = ({ spheres, freeForm, scans }) => [...spheres, freeForm, ...scans];
 
-/** How many times as long as `variant` a baseline takes on each cloud; `clock` is `module` or `total`. */
+/** How many times as long as `variant` a baseline takes on each cloud; `clock` is `module`, `fastest` or `total`. */
 export const ratios = (clouds, baseline, variant, clock = 'module') =>
   clouds.map(({ methods }) => methods[baseline][clock] / methods[variant][clock]);
 
@@ -19,9 +19,10 @@ export function bar(rows) {
   const clouds = compared(rows);
   return OURS.map((variant) => {
     const reached = Object.entries(BAR).map(([baseline, least]) => {
-      const values = ratios(clouds, baseline, variant);
-      const totals = ratios(clouds, baseline, variant, 'total');
-      return [baseline, { values, totals, met: values.filter((value) => value >= least).length }];
+      const [values, fastest, totals] = ['module', 'fastest', 'total'].map((clock) =>
+        ratios(clouds, baseline, variant, clock),
+      );
+      return [baseline, { values, fastest, totals, met: values.filter((value) => value >= least).length }];
     });
     return { variant, clouds: clouds.length, ...Object.fromEntries(reached) };
   });

@@ -40,73 +40,57 @@ export const SMALL = {
 
 /** All experiments; `tell` hears what is being measured. */
 export async function measureAll(estimator, { plan, scans, tell }) {
-  // The engine compiles what is hot once more, better: not during what counts.
-  await compare(estimator, { positions: sphere(50_000) }, { variants: VARIANTS, rounds: 2 });
-
-  const { rounds } = plan;
-  const spheres = [];
-  for (const points of plan.spheres) {
-    tell(`sphere of ${points} points`);
-    const positions = sphere(points);
-    const ball = { positions, truth: positions };
-    const methods = await compare(estimator, ball, { variants: VARIANTS, rounds, classed: CLASSED });
-    spheres.push({ name: `${points / 1e6} M`, points, methods });
-  }
-
-  tell('free-form surface');
   const patch = freeForm(plan.freeForm);
-  const surface = { positions: patch.positions, truth: patch.normals };
-  const methods = await compare(estimator, surface, { variants: VARIANTS, rounds });
+  const surface = { name: 'free-form surface', positions: patch.positions, truth: patch.normals };
+  const clouds = [...plan.spheres.map((points) => ball(`${points / 1e6} M`, points, CLASSED)), surface, ...scans];
+  const { rounds } = plan;
+  // The engine compiles what is hot once more, better: not during what counts.
+  await compare(estimator, [ball('warm-up', 50_000)], { variants: VARIANTS, rounds: 2, tell: () => {} });
+  const compared = await compare(estimator, clouds, { variants: VARIANTS, rounds, tell });
 
-  const rows = [];
-  for (const { name, about, positions } of scans) {
-    tell(name);
-    const methods = await compare(estimator, { positions }, { variants: VARIANTS, rounds });
-    rows.push({ name, about, points: positions.length / 3, methods });
-  }
-
-  tell('edge of the cubes');
-  const variants = Object.fromEntries(plan.factors.map((scale) => [scale, { cell: { scale } }]));
-  const positions = sphere(plan.sweep);
-  const clouds = { sphere: { positions, truth: positions }, 'free-form surface': surface };
-  const largest = scans.at(-1);
-  if (largest) clouds[largest.name] = largest;
-  const sweep = [];
-  for (const [name, cloud] of Object.entries(clouds)) {
-    const measured = await compare(estimator, cloud, { variants, rounds });
-    const steps = plan.factors.map((factor) => ({ factor, ...measured[factor] }));
-    sweep.push({ name, points: cloud.positions.length / 3, steps });
-  }
+  const factors = Object.fromEntries(plan.factors.map((scale) => [scale, { cell: { scale } }]));
+  const swept = [ball('sphere', plan.sweep), surface, ...scans.slice(-1)];
+  const sweep = await compare(estimator, swept, { variants: factors, rounds, tell });
   return {
     rounds,
-    spheres,
-    freeForm: { name: 'free-form surface', points: plan.freeForm, methods },
-    scans: rows,
-    sweep,
+    spheres: compared.slice(0, plan.spheres.length),
+    freeForm: compared[plan.spheres.length],
+    scans: compared.slice(plan.spheres.length + 1),
+    sweep: sweep.map(({ methods, ...cloud }) => ({
+      ...cloud,
+      steps: plan.factors.map((factor) => ({ factor, ...methods[factor] })),
+    })),
   };
 }
 
+/** A sphere, whose true normals are its points. */
+function ball(name, points, classed = []) {
+  const positions = sphere(points);
+  return { name, positions, truth: positions, classed };
+}
+
 /**
- * Runs all variants on a cloud in turn, round by round, so that whatever else the machine does hits all of them. For
- * each the medians of its times in milliseconds: `module`, the sum of the phases inside the wasm module; `total`, what
- * the caller waits for, with copies in and out. With `truth`, the true normals, also the errors.
+ * Runs all variants on all clouds in turn, round by round, so that whatever else the machine does hits all of them. A
+ * cloud with `truth`, the true normals, gets errors too; `classed` are the variants whose points are told apart by nodes.
  */
-async function compare(estimator, { positions, truth }, { variants, rounds, classed = [] }) {
-  const measured = {};
+async function compare(estimator, clouds, { variants, rounds, tell }) {
+  const rows = clouds.map(({ name, about, positions }) => ({ name, about, points: positions.length / 3, methods: {} }));
   for (let round = 0; round < rounds; round++) {
-    for (const [name, options] of Object.entries(variants)) {
-      if (options.method && round % 2 === 1) continue;
-      const { normals, report } = await estimator.estimateNormals(positions, options);
-      measured[name] ??= {
-        reports: [],
-        ...(truth && judge(positions, truth, normals, report, classed.includes(name))),
-      };
-      measured[name].reports.push(report);
+    for (const [i, { positions, truth, classed = [] }] of clouds.entries()) {
+      tell(`round ${round + 1} of ${rounds}: ${rows[i].name}`);
+      for (const [name, options] of Object.entries(variants)) {
+        if (options.method && round % 2 === 1) continue;
+        const { normals, report } = await estimator.estimateNormals(positions, options);
+        const errors = () => truth && judge(positions, truth, normals, report, classed.includes(name));
+        rows[i].methods[name] ??= { reports: [], errors: errors() };
+        rows[i].methods[name].reports.push(report);
+      }
     }
   }
-  return Object.fromEntries(
-    Object.entries(measured).map(([name, { reports, ...errors }]) => [name, { ...times(reports), ...errors }]),
-  );
+  for (const { methods } of rows) {
+    for (const [name, { reports, errors }] of Object.entries(methods)) methods[name] = { ...times(reports), ...errors };
+  }
+  return rows;
 }
 
 function judge(positions, truth, normals, report, isClassed) {
@@ -127,6 +111,10 @@ function byClass(classOf, errors, { points, nodesUsed }) {
   };
 }
 
+/**
+ * Medians of some runs, in milliseconds: `module`, the sum of the phases inside the wasm module, of which there is also
+ * the `fastest`; `total`, what the caller waits for, with copies in and out. And what the report tells besides.
+ */
 function times(reports) {
   const { milliseconds, ...facts } = reports[0];
   const phases = Object.keys(milliseconds).filter((phase) => phase !== 'total');
@@ -134,6 +122,7 @@ function times(reports) {
   return {
     ...facts,
     module: median(sums),
+    fastest: Math.min(...sums),
     total: median(reports.map((report) => report.milliseconds.total)),
     phases: Object.fromEntries(
       phases.map((phase) => [phase, median(reports.map((report) => report.milliseconds[phase]))]),
