@@ -70,6 +70,7 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     let bulk = Bulk::of(points.len(), &|i| points.positions[i].as_dvec3());
     match options.method {
         Method::Bilinear => bilinear(points, options, &bounds, &bulk, laps),
+        _ if !cfg!(feature = "full") => Err(Error::Unsupported("the baselines are not in this build".into())),
         Method::Knn => baseline(points, Baseline::Knn { k: options.k.unwrap_or(16) as usize }, &bounds, &bulk, laps),
         Method::Egg => baseline(points, Baseline::Egg { k: options.k.unwrap_or(8) as usize }, &bounds, &bulk, laps),
     }

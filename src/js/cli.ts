@@ -131,7 +131,7 @@ function parseOrient(value: string): EstimateOptions['orient'] {
 async function run(task: Task): Promise<Report> {
   const source = await about(task.input, () => openInput(task.input));
   await about(task.output, () => checkFolder(task.output));
-  const estimator = await createEstimator({ threads: task.threads });
+  let estimator = await createEstimator({ threads: task.threads });
   const show = task.quiet || !process.stderr.isTTY ? undefined : showProgress;
   try {
     const { normals, curvature, report } = await about(task.input, async () => {
@@ -139,6 +139,9 @@ async function run(task: Task): Promise<Report> {
       const options = { ...withViewpoint(task.estimate, cloud), transfer: true, onProgress: show?.('computing') };
       return estimator.estimateNormals(cloud.positions, options);
     });
+    // Another one, so that the memory of the first is free again.
+    estimator.dispose();
+    estimator = await createEstimator({ threads: task.threads });
     const format = task.ascii ? 'ascii' : 'binary_little_endian';
     const additions = { normals, ...(curvature && { curvature }) };
     const ply = await about(task.input, () =>

@@ -112,8 +112,9 @@ export interface EstimatorOptions {
   /** Default `'auto'`: one for each processor, at most 16. 1 is the single-threaded build. */
   threads?: number | 'auto';
   /**
-   * A folder that holds `single.wasm` and `threads.wasm` (this package exports both under these names), for those who
-   * host them themselves. A relative address counts from the page; in Node, from the working directory.
+   * A folder that holds `single.wasm` and `threads.wasm`, and for `writePly`, `'knn'` and `'egg'` also
+   * `single-full.wasm` and `threads-full.wasm` (this package exports them under these names), for those who host them
+   * themselves. A relative address counts from the page; in Node, from the working directory.
    */
   wasmUrl?: string | URL;
   /** Most memory the wasm module may take, 16 to 4096. Default 4096, or the most that the engine grants. */

@@ -481,13 +481,16 @@ test('an estimator finds wasm files that are hosted elsewhere', async (context) 
   const { copyFileSync, mkdirSync } = await import('node:fs');
   mkdirSync(folder);
   for (const build of ['single', 'threads']) {
-    copyFileSync(join(home, 'dist', build, 'bilinormal_bg.wasm'), join(folder, `${build}.wasm`));
+    copyFileSync(join(home, 'dist', build, 'core.wasm'), join(folder, `${build}.wasm`));
+    copyFileSync(join(home, 'dist', build, 'full.wasm'), join(folder, `${build}-full.wasm`));
   }
   for (const threads of [1, 2]) {
     for (const wasmUrl of [pathToFileURL(folder), `${pathToFileURL(folder)}/`]) {
       const estimator = await estimatorFor(context, { threads, wasmUrl });
-      const { report } = await estimator.estimateNormals(sphere(100));
-      assert.equal(report.threads, threads);
+      for (const method of ['bilinear', 'knn']) {
+        const { report } = await estimator.estimateNormals(sphere(100), { method });
+        assert.equal(report.threads, threads);
+      }
     }
   }
 });
