@@ -231,21 +231,21 @@ fn clouds() -> Vec<(&'static str, Vec<f32>)> {
     let scaled = |points: Vec<f32>, scale: f32| points.into_iter().map(|c| c * scale).collect::<Vec<f32>>();
     let mut random = Random(14);
     let strip = (0..600).flat_map(|_| turn([random.signed(), 1e-3 * random.signed(), 0.0]).map(|c| c as f32)).collect();
-    let mut clusters = sphere(500, 5).points;
-    clusters.extend(sphere(500, 6).points.iter().map(|c| c + 1000.0));
-    let mut spoilt = sphere(1000, 10).points;
+    let mut clusters = sphere(300, 5).points;
+    clusters.extend(sphere(300, 6).points.iter().map(|c| c + 1000.0));
+    let mut spoilt = sphere(600, 10).points;
     for i in (0..spoilt.len()).step_by(10) {
         spoilt[i] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY][i % 3];
     }
     vec![
-        ("sphere", sphere(2000, 1).points),
-        ("uneven torus", torus(1500, 2).points),
-        ("terrain", terrain(1500, 3).points),
-        ("flat grid", grid(1000, [40, 25, 1])),
+        ("sphere", sphere(1200, 1).points),
+        ("uneven torus", torus(800, 2).points),
+        ("terrain", terrain(800, 3).points),
+        ("flat grid", grid(600, [30, 20, 1])),
         ("solid grid", grid(1000, [10, 10, 10])),
         ("thin grid", grid(900, [300, 3, 1])),
-        ("coarse sphere", scaled(sphere(1000, 4).points, 8.0).iter().map(|c| c.round()).collect()),
-        ("every point thrice", sphere(400, 4).points.repeat(3)),
+        ("coarse sphere", scaled(sphere(700, 4).points, 8.0).iter().map(|c| c.round()).collect()),
+        ("every point thrice", sphere(250, 4).points.repeat(3)),
         ("half of it one point", [[0.1, 0.2, 0.3].repeat(300), sphere(300, 7).points].concat()),
         ("all equal", [1.5, -2.5, 3.5].repeat(300)),
         ("on a line", (0..400).flat_map(|i| [i as f32 * 0.3, i as f32 * -0.2, i as f32 * 0.7]).collect()),
@@ -303,7 +303,7 @@ fn normals_are_those_of_the_definitions() {
 fn normals_of_survey_coordinates_are_those_of_the_definitions() {
     let shift = [500_000.0, 5_000_000.0, 100.0];
     let far: Vec<f64> =
-        torus(1000, 13).points.iter().zip(shift.iter().cycle()).map(|(c, s)| f64::from(*c) + s).collect();
+        torus(600, 13).points.iter().zip(shift.iter().cycle()).map(|(c, s)| f64::from(*c) + s).collect();
     let points = Points::from_f64(&far).unwrap();
     let near: Vec<f32> = far.iter().zip(points.origin().iter().cycle()).map(|(c, o)| (c - o) as f32).collect();
     compare("survey", &points, &near);
