@@ -2,10 +2,13 @@
 #![cfg(not(target_arch = "wasm32"))]
 
 mod common;
+#[allow(dead_code)] // Two files are not compared here.
+mod reference;
 
 use bilinormal::{Method, Options, Points};
 use common::*;
 use glam::{DVec3, Vec3};
+use reference::Ply;
 use std::array::from_fn;
 use std::f64::consts::PI;
 
@@ -317,6 +320,29 @@ fn whole_numbers_are_exact() {
     let options = Options { method: Method::Egg, k: Some(50), ..Options::default() };
     let normal = run_with(&Points::from_f32(&points).unwrap(), &options).normals[..3].to_vec();
     assert!(angles(&normal, &[unit([1.0; 3])])[0] < 0.01, "{normal:?}");
+}
+
+/// `tests/fixtures/foreign.py` tells how they came about.
+#[test]
+fn knn_agrees_with_other_libraries() {
+    let file = Ply::parse(include_bytes!("fixtures/foreign.ply"));
+    let rows = |names: [&str; 3]| {
+        let [x, y, z] = names.map(|name| file.floats(name));
+        x.into_iter().zip(y).zip(z).map(|((x, y), z)| [x, y, z]).collect::<Vec<[f32; 3]>>()
+    };
+    let positions = rows(["x", "y", "z"]).concat();
+    let options = Options { method: Method::Knn, k: Some(16), ..Options::default() };
+    let normals = run_with(&Points::from_f32(&positions).unwrap(), &options).normals;
+    for library in ["small_gicp", "open3d"] {
+        let names = ["nx", "ny", "nz"].map(|axis| format!("{library}_{axis}"));
+        let theirs: Vec<[f64; 3]> =
+            rows([&names[0], &names[1], &names[2]]).into_iter().map(|n| n.map(f64::from)).collect();
+        let angles = angles(&normals, &theirs);
+        // Where two distances are equal in single precision, theirs may take the other point.
+        let away = angles.iter().filter(|angle| angle.to_radians() > 1e-3).count();
+        println!("{library}: worst angle {:.1e} degrees, {away} away", worst(&angles));
+        assert!(away <= 2, "{library}: {away} normals of {} are others", angles.len());
+    }
 }
 
 /// The table of exact neighbours of METHOD.md: root mean square angles in degrees of k = 16, 30 and 100.
