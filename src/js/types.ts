@@ -14,14 +14,20 @@ export interface Progress {
 }
 
 export interface EstimateOptions {
-  /** Default `'bilinear'`, the paper's method; the others are its baselines. */
+  /**
+   * Default `'bilinear'`, the paper's method. The others are its baselines, some ten times as slow: `'knn'` fits a plane
+   * to the k nearest points, `'egg'` a curved surface to the neighbours in the elliptic Gabriel graph.
+   */
   method?: 'bilinear' | 'knn' | 'egg';
   /**
-   * Edge of the cubes, default `'auto'`. `scale`: multiples of the paper's L (Eq. 1), 0.1 to 100; `size`: in the units
+   * Edge of the cubes of `'bilinear'`, default `'auto'`. `scale`: multiples of the paper's L (Eq. 1), 0.1 to 100; `size`: in the units
    * of the input. Small cubes follow detail, large ones average noise away.
    */
   cell?: 'auto' | { scale: number } | { size: number };
-  /** Neighbours of `'knn'` (default 16) and candidates of `'egg'` (default 8). */
+  /**
+   * How many of the nearest points, at least 3: for `'knn'` with the point itself (default 16), for `'egg'` as candidates
+   * besides it (default 8).
+   */
   k?: number;
   /** How signs are chosen. Default `'none'`: deterministic, and nothing more. */
   orient?:
@@ -50,7 +56,7 @@ export interface Report {
   points: number;
   /** Points that got the zero vector: not finite, or without neighbours. */
   unresolved: number;
-  /** Occupied cubes. */
+  /** Occupied cubes. This and all about cubes and nodes is 0 for the baselines, which have none. */
   cells: number;
   /** Cubes with a valid node. */
   nodes: number;
@@ -60,7 +66,7 @@ export interface Report {
   cellSize: number;
   /** Edge of the cubes in multiples of the paper's L. */
   scale: number;
-  /** Points interpolated from 0, 1, 2, 3 and 4 nodes. */
+  /** Points interpolated from 0, 1, 2, 3 and 4 nodes; all from 0 for the baselines. */
   nodesUsed: [number, number, number, number, number];
   /**
    * Each phase in the wasm module, and `total`: from the moment the call left the queue to its result in the calling
