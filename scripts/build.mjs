@@ -2,23 +2,28 @@
 // All flags of the builds are here, in single.toml and threads.toml beside this file, and in Cargo.toml.
 
 import { createHash } from 'node:crypto';
-import { existsSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdirSync, readFileSync, readdirSync, renameSync, rmSync, writeFileSync } from 'node:fs';
 import { dirname, join, relative } from 'node:path';
 import { gzipSync } from 'node:zlib';
 import { shortenGlue } from './glue.mjs';
 import { Failure, main, root, run, started, tell } from './run.mjs';
 import { setup } from './setup.mjs';
 
-/** The wasm builds: what cargo is told, what happens to the glue, and the gzipped size allowed in KiB. */
+/**
+ * The wasm builds: what cargo is told, what happens to the glue, and the gzipped size allowed in KiB. Each is a module
+ * `core`, which every page loads, and a module `full`, which has all there is and is loaded when something asks for it.
+ */
 const WASM = {
   single: {
-    cargo: ['--no-default-features', '--config', 'scripts/single.toml'],
+    features: [],
+    cargo: ['--config', 'scripts/single.toml'],
     finish: (glue) => glue,
     limit: 60,
   },
   threads: {
+    features: ['threads'],
     // A target directory of its own, because it holds a standard library of its own.
-    cargo: ['--features', 'threads', '--config', 'scripts/threads.toml', '--target-dir', 'target/threads'],
+    cargo: ['--config', 'scripts/threads.toml', '--target-dir', 'target/threads'],
     finish: withOwnPool,
     limit: 100,
   },
@@ -30,7 +35,9 @@ export function build() {
   const flags = ['scripts/build.mjs', 'scripts/glue.mjs', 'scripts/single.toml', 'scripts/threads.toml'];
   const wasmSources = [...filesIn('src', '.rs'), ...flags, 'Cargo.toml', 'Cargo.lock', 'rust-toolchain.toml'];
   const built = Object.keys(WASM).map((name) =>
-    once(`dist/${name} by wasm-pack`, wasmSources, [`dist/${name}/bilinormal_bg.wasm`], () => buildWasm(name)),
+    once(`dist/${name} by wasm-pack`, wasmSources, [`dist/${name}/core.wasm`, `dist/${name}/full.wasm`], () =>
+      buildWasm(name),
+    ),
   );
   const sources = [...filesIn('src/js'), 'tsconfig.json', ...wasmSources];
   built.push(once('dist/*.js by tsc and esbuild', sources, ['dist/index.js'], buildJavaScript));
@@ -68,17 +75,36 @@ function once(what, inputs, outputs, job) {
 }
 
 function buildWasm(name) {
-  const { cargo, finish } = WASM[name];
+  const folder = `dist/${name}`;
+  rmSync(join(root, folder), { recursive: true, force: true });
+  // One glue serves both modules: that of the core is a part of it.
+  const core = pack(name, 'core', []);
+  const full = pack(name, 'full', ['full']);
+  const missing = core.split('\n').find((line) => !full.includes(line));
+  if (missing) throw new Failure(`${folder}: the glue of the core has a line that is not in the full one: ${missing}`);
+  writeFileSync(join(root, folder, 'bilinormal.js'), shortenGlue(WASM[name].finish(full), folder));
+  esbuild([`${folder}/bilinormal.js`, `--outfile=${folder}/bilinormal.js`, '--allow-overwrite']);
+}
+
+/** Builds one module by wasm-pack; leaves it under its name, and answers its glue. */
+function pack(name, module, extra) {
+  const { features, cargo } = WASM[name];
   const folder = join(root, 'dist', name);
-  rmSync(folder, { recursive: true, force: true });
   // The npm package has one package.json, readme and licence of its own: none from wasm-pack.
-  const output = ['--out-dir', `dist/${name}`, '--out-name', 'bilinormal', '--no-pack', '--no-gitignore'];
-  run('wasm-pack', ['build', '.', '--mode', 'no-install', '--target', 'web', '--release', ...output, '--', ...cargo]);
-  const glue = join(folder, 'bilinormal.js');
-  writeFileSync(glue, finish(readFileSync(glue, 'utf8')));
+  const output = [
+    '--out-dir',
+    `dist/${name}`,
+    '--out-name',
+    'bilinormal',
+    '--no-pack',
+    '--no-gitignore',
+    '--no-typescript',
+  ];
+  const chosen = ['--no-default-features', '--features', [...features, ...extra].join(), ...cargo];
+  run('wasm-pack', ['build', '.', '--mode', 'no-install', '--target', 'web', '--release', ...output, '--', ...chosen]);
   rmSync(join(folder, 'snippets'), { recursive: true, force: true });
-  shortenGlue(`dist/${name}`);
-  esbuild([`dist/${name}/bilinormal.js`, `--outfile=dist/${name}/bilinormal.js`, '--allow-overwrite']);
+  renameSync(join(folder, 'bilinormal_bg.wasm'), join(folder, `${module}.wasm`));
+  return readFileSync(join(folder, 'bilinormal.js'), 'utf8');
 }
 
 /**
@@ -88,7 +114,7 @@ function buildWasm(name) {
 function withOwnPool(glue) {
   const helper = /(import \{ startWorkers \} from )'\.\/snippets\/wasm-bindgen-rayon-[^']*\/workerHelpers\.js'/;
   if (!helper.test(glue))
-    throw new Failure('dist/threads/bilinormal.js: no import of startWorkers to point at pool.js');
+    throw new Failure('the glue of the threads build has no import of startWorkers to point at pool.js');
   return glue.replace(helper, "$1'../pool.js'");
 }
 
@@ -113,16 +139,15 @@ function esbuild(options) {
 
 /** What a browser downloads, gzipped. */
 export function sizes() {
-  const wasm = Object.entries(WASM).map(([name, { limit }]) => [
-    `${name} wasm`,
-    [`dist/${name}/bilinormal_bg.wasm`],
-    limit,
+  const wasm = Object.entries(WASM).flatMap(([name, { limit }]) => [
+    [`${name} wasm`, [`dist/${name}/core.wasm`], limit],
+    [`${name} wasm with what few pages need`, [`dist/${name}/full.wasm`], Infinity],
   ]);
   return [...wasm, ['JavaScript', downloadedJavaScript(), JAVASCRIPT_LIMIT]].map(([what, files, limit]) => {
     const bytes = files.map((file) => gzipSync(readFileSync(join(root, file)), { level: 9 }).length);
     const kibibytes = bytes.reduce((sum, size) => sum + size, 0) / 1024;
     const fits = kibibytes <= limit;
-    const verdict = fits ? ` of ${limit} allowed` : `, more than the ${limit} allowed`;
+    const verdict = !fits ? `, more than the ${limit} allowed` : limit < Infinity ? ` of ${limit} allowed` : '';
     return { fits, text: `${what} ${kibibytes.toFixed(1)} KiB gzipped${verdict} (${files.join(', ')})` };
   });
 }

@@ -3,14 +3,13 @@
 // freeing to the garbage collector; and each import name has a hash, which does not compress. In all that is 1.7 of the
 // 8 KiB of JavaScript that a page may load.
 
-import { readFileSync, writeFileSync } from 'node:fs';
+import { readFileSync, readdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
-import { Failure, output, root } from './run.mjs';
+import { Failure, root } from './run.mjs';
 
-/** Shortens the glue in a folder of dist/, and the names that it shares with the wasm module beside it. */
-export function shortenGlue(folder) {
-  const path = join(root, folder, 'bilinormal.js');
-  writeFileSync(path, shortenNames(shortenCode(readFileSync(path, 'utf8')), join(root, folder, 'bilinormal_bg.wasm')));
+/** Shortens glue, and the names that it shares with the wasm modules in a folder of dist/. */
+export function shortenGlue(glue, folder) {
+  return shortenNames(shortenCode(glue), join(root, folder));
 }
 
 function shortenCode(glue) {
@@ -56,7 +55,16 @@ export { init as default };
   edit(/\w+Finalization\.(un)?register\(.*\);\n/g, '');
   // Nor does anything else call this border than serve.ts, whose types the compiler checks.
   edit(/ *_assertClass\(.*\);\n/g, '');
+  edit(/function _assertClass[^]*?\n}\n/, '');
+  edit(/ *try \{\n([^{}]*(?:\{[^{}]*\}[^{}]*)*)\} catch \(e\) \{\n(?: +if \(ptr.*\n)+ +throw e;\n +\}\n/g, '$1');
   edit(/if \(Symbol\.dispose\).*\n/g, '');
+  // The memory is always handed in.
+  edit(/memory \|\| new WebAssembly\.Memory\(.*\)/, 'memory');
+  // A view costs less than the code that keeps it.
+  edit(
+    /let cached(\w+)Memory0 = null;\nfunction (\w+)\(\) \{[^]*?\n\}\n/g,
+    'const $2 = () => new $1(wasm.memory.buffer);\n',
+  );
   // Properties that only the glue itself uses.
   edit(/__destroy_into_raw/g, 'raw');
   edit(/__wbg_ptr/g, 'at');
@@ -64,19 +72,85 @@ export { init as default };
   return glue;
 }
 
-/** wasm-opt gives short names to imports and exports, and prints which; the glue takes them over. */
-function shortenNames(glue, wasm) {
-  const printed = output('wasm-opt', [wasm, '--minify-imports-and-exports-and-modules', '-o', wasm]);
-  if (!printed) throw new Failure(`wasm-opt could not shorten the names in ${wasm}`);
-  const { imports, exports } = JSON.parse(printed);
-  const imported = new Map(imports.map(([, name, short]) => [name, short]));
-  const exported = new Map(exports);
-  const shortOf = (names, name) => {
-    if (!names.has(name)) throw new Failure(`${wasm} has no ${name}, which its glue uses`);
-    return names.get(name);
+/** Gives the imports and exports of all modules in a folder short names, the same in each, and the glue with them. */
+function shortenNames(glue, folder) {
+  const shorts = new Map();
+  const short = (name) => {
+    if (!shorts.has(name)) shorts.set(name, letters(shorts.size));
+    return shorts.get(name);
+  };
+  for (const file of readdirSync(folder).filter((file) => file.endsWith('.wasm'))) {
+    const path = join(folder, file);
+    writeFileSync(path, withNames(readFileSync(path), short));
+  }
+  const known = (name) => {
+    if (!shorts.has(name)) throw new Failure(`no module in ${folder} has ${name}, which the glue uses`);
+    return shorts.get(name);
   };
   return glue
-    .replace(/(?<=\n {8})(\w+)(?=: (?:function|memory))/g, (name) => shortOf(imported, name))
-    .replace('"./bilinormal_bg.js": import0', 'a: import0')
-    .replace(/(?<=\bwasm\.)\w+/g, (name) => shortOf(exported, name));
+    .replace(/(?<=\n {8})(\w+)(?=: (?:function|memory))/g, known)
+    .replace('"./bilinormal_bg.js": import0', `${known('./bilinormal_bg.js')}: import0`)
+    .replace(/(?<=\bwasm\.)\w+/g, known);
+}
+
+/** The numbers as a, b, ... z, ba, bb ... */
+const letters = (number) =>
+  [...number.toString(26)].map((digit) => String.fromCharCode(97 + parseInt(digit, 26))).join('');
+
+/** A wasm module with other names of its imports and exports (https://webassembly.github.io/spec/core/binary/modules.html). */
+function withNames(module, rename) {
+  const IMPORTS = 2;
+  const EXPORTS = 7;
+  let at = 8;
+  const number = () => {
+    for (let value = 0, shift = 0; ; shift += 7) {
+      value += (module[at] & 0x7f) * 2 ** shift;
+      if (module[at++] < 0x80) return value;
+    }
+  };
+  const encoded = (value) => {
+    const bytes = [];
+    for (; value >= 0x80; value = Math.floor(value / 0x80)) bytes.push((value % 0x80) | 0x80);
+    return Buffer.from([...bytes, value]);
+  };
+  const name = () => {
+    const length = number();
+    at += length;
+    const renamed = Buffer.from(rename(module.toString('utf8', at - length, at)));
+    return Buffer.concat([encoded(renamed.length), renamed]);
+  };
+  /** A table, memory, or both, has limits: flags, least, and most if the lowest flag is set. */
+  const limits = () => {
+    const hasMost = module[at++] & 1;
+    number();
+    if (hasMost) number();
+  };
+  const type = {
+    0: number,
+    1: () => ((at += 1), limits()),
+    2: limits,
+    3: () => (at += 2),
+  };
+  const part = (read) => {
+    const start = at;
+    read();
+    return module.subarray(start, at);
+  };
+  const pieces = [module.subarray(0, at)];
+  while (at < module.length) {
+    const id = module[at++];
+    const length = number();
+    const start = at;
+    let body = module.subarray(start, start + length);
+    if (id === IMPORTS || id === EXPORTS) {
+      const count = number();
+      const entries = Array.from({ length: count }, () =>
+        id === IMPORTS ? [name(), name(), part(() => type[module[at++]]())] : [name(), part(() => (at++, number()))],
+      );
+      body = Buffer.concat([encoded(count), ...entries.flat()]);
+    }
+    at = start + length;
+    pieces.push(Buffer.from([id]), encoded(body.length), body);
+  }
+  return Buffer.concat(pieces);
 }

@@ -9,8 +9,10 @@ const wasm = ['--target', 'wasm32-unknown-unknown'];
 const checks = {
   'Rust is formatted': () => run('cargo', ['fmt', '--check']),
   'clippy, native': () => clippy('--all-targets'),
-  'clippy, native without threads': () => clippy('--all-targets', '--no-default-features'),
-  'clippy, wasm single': () => clippy('--lib', '--test', 'border', '--no-default-features', ...wasm),
+  'clippy, native without threads': () => clippy('--all-targets', '--no-default-features', '--features', 'full'),
+  'clippy, wasm core': () => clippy('--lib', '--no-default-features', ...wasm),
+  'clippy, wasm single': () =>
+    clippy('--lib', '--test', 'border', '--no-default-features', '--features', 'full', ...wasm),
   'clippy, wasm threads': () =>
     clippy(
       '--lib',

@@ -16,7 +16,7 @@ function nodeTests(folder, options = []) {
   });
 }
 
-const border = ['--no-default-features', '--test', 'border'];
+const border = ['--no-default-features', '--features', 'full', '--test', 'border'];
 const tests = {
   'sizes of the downloads': () => {
     sizes().forEach(({ text }) => tell(text));

@@ -49,8 +49,9 @@ pub struct Report {
 /// Output length equals input length; a point that is not finite, or that has no neighbours to tell a plane from, gets
 /// the zero vector and influences no other. The result is the same to the bit for any number of threads.
 ///
-/// Linear in the number of points. Takes about 35 bytes a point beyond the input when cubes hold 4 points or more, and up
-/// to some 130 when every point has a cube for itself.
+/// [`Method::Bilinear`] is linear in the number of points, and takes about 35 bytes a point beyond the input when cubes
+/// hold 4 points or more, up to some 130 when every point has a cube for itself. The baselines take n log n time and 30
+/// bytes a point.
 ///
 /// # Errors
 /// [`Error::Input`] and [`Error::Unsupported`] for the options, [`Error::Limit`] when memory does not suffice,
@@ -70,6 +71,7 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     let bulk = Bulk::of(points.len(), &|i| points.positions[i].as_dvec3());
     match options.method {
         Method::Bilinear => bilinear(points, options, &bounds, &bulk, laps),
+        _ if !cfg!(feature = "full") => Err(Error::Unsupported("the baselines are not in this build".into())),
         Method::Knn => baseline(points, Baseline::Knn { k: options.k.unwrap_or(16) as usize }, &bounds, &bulk, laps),
         Method::Egg => baseline(points, Baseline::Egg { k: options.k.unwrap_or(8) as usize }, &bounds, &bulk, laps),
     }

@@ -9,14 +9,18 @@ mod error;
 mod estimate;
 mod memory;
 mod options;
-mod ply;
+mod read;
+#[cfg(feature = "full")]
+mod write;
 
 pub use buffer::Buffer;
 pub use estimate::{Estimation, estimate};
 pub use memory::set_maximum;
-pub use ply::{Cloud, read_ply, write_cloud, write_ply};
+pub use read::{Cloud, read_ply};
 #[cfg(feature = "threads")]
 pub use wasm_bindgen_rayon::init_thread_pool;
+#[cfg(feature = "full")]
+pub use write::{write_cloud, write_ply};
 
 use crate::error::Error;
 use crate::progress::Progress;

@@ -4,7 +4,7 @@ export const count = (value) => value.toLocaleString('en');
 export const millions = (value) => (value / 1e6).toFixed(3);
 export const milliseconds = (value) => (value < 10 ? value.toFixed(1) : count(Math.round(value)));
 export const ratio = (value) => value.toFixed(1);
-export const error = (value) => value.toFixed(value < 0.001 ? 5 : 4);
+export const error = (value) => (value < 0.001 ? Number(value.toPrecision(2)).toString() : value.toFixed(4));
 export const degrees = (value) => `${value.toFixed(value < 10 ? 1 : 0)}°`;
 
 /** A share, with a digit more close to nothing and to all, so that these are told from nothing and from all. */
@@ -12,7 +12,7 @@ export function percent(share) {
   const value = 100 * share;
   if (value === 0 || value === 100) return `${value} %`;
   if (value < 0.005) return 'below 0.01 %';
-  const digits = value < 0.095 ? 2 : value < 9.95 || value >= 99.5 ? 1 : 0;
+  const digits = value < 0.095 ? 2 : value < 9.95 || Math.abs(value - 100) <= 0.5 ? 1 : 0;
   return `${value.toFixed(digits)} %`;
 }
 

@@ -165,9 +165,7 @@ function without(clouds) {
     return shares.some((share) => share > 0) && `${label(variant)} ${range(shares, percent)}`;
   });
   const named = missing.filter(Boolean).join(', ');
-  return named
-    ? `Points that get no normal, where errors are counted as right angles: ${named}.`
-    : 'Every point gets a normal.';
+  return named ? `Points that get no normal (in errors a right angle): ${named}.` : 'Every point gets a normal.';
 }
 
 function spheres({ spheres }, pictures) {

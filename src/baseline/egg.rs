@@ -36,9 +36,10 @@ pub(super) fn normal(
     sort(nearest);
     let others = nearest.iter().map(|neighbour| neighbour.place as usize).filter(|place| *place != point);
     let relative = |place: usize| places[place].position - places[point].position;
-    let farthest = relative(others.clone().next_back()?);
-    // Units of this length are what moments are made for.
-    let scale = 1.0 / farthest.as_dvec3().length();
+    let radius = relative(others.clone().next_back()?).as_dvec3().length();
+    // Units of about the radius are what moments are made for: the power of two below it, so that points that lie on an
+    // ellipsoid stay on it when their coordinates are whole numbers.
+    let scale = 1.0 / f64::from_bits(radius.to_bits() >> 52 << 52);
     if !scale.is_finite() {
         return None;
     }

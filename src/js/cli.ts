@@ -19,7 +19,7 @@ is kept, existing normals are replaced. IN may be - for standard input.
       --cell auto        edge of the cubes from the data (default)
       --cell-scale S     ... in multiples of cbrt(volume / points), 0.1 to 100; larger averages more noise away
       --cell-size L      ... in the units of the file
-      --k N              neighbours of knn (default 16), candidates of egg (default 8)
+      --k N              nearest points of knn (default 16), candidates of egg (default 8); at least 3
       --orient HOW       none (default), consistent, outward, viewpoint=x,y,z or up=x,y,z
       --curvature        add the surface variation as the property curvature
       --threads N        default: one for each processor
@@ -83,7 +83,7 @@ function parse(args: string[]): Task | undefined {
   if (values.cell !== undefined) estimate.cell = choice('cell', values.cell, ['auto']);
   if (values['cell-scale'] !== undefined) estimate.cell = { scale: number('cell-scale', values['cell-scale']) };
   if (values['cell-size'] !== undefined) estimate.cell = { size: number('cell-size', values['cell-size']) };
-  if (values.k !== undefined) estimate.k = wholeNumber('k', values.k);
+  if (values.k !== undefined) estimate.k = wholeNumber('k', values.k, 3);
   if (values.orient !== undefined) estimate.orient = parseOrient(values.orient);
   if (values.curvature) estimate.curvature = true;
   return {
@@ -109,10 +109,10 @@ function number(option: string, value: string): number {
   return found;
 }
 
-function wholeNumber(option: string, value: string): number {
+function wholeNumber(option: string, value: string, least = 1): number {
   const found = number(option, value);
-  if (!Number.isInteger(found) || found < 1)
-    throw new UsageError(`--${option} is ${value}; wanted a whole number of at least 1`);
+  if (!Number.isInteger(found) || found < least)
+    throw new UsageError(`--${option} is ${value}; wanted a whole number of at least ${least}`);
   return found;
 }
 
@@ -131,7 +131,7 @@ function parseOrient(value: string): EstimateOptions['orient'] {
 async function run(task: Task): Promise<Report> {
   const source = await about(task.input, () => openInput(task.input));
   await about(task.output, () => checkFolder(task.output));
-  const estimator = await createEstimator({ threads: task.threads });
+  let estimator = await createEstimator({ threads: task.threads });
   const show = task.quiet || !process.stderr.isTTY ? undefined : showProgress;
   try {
     const { normals, curvature, report } = await about(task.input, async () => {
@@ -139,6 +139,9 @@ async function run(task: Task): Promise<Report> {
       const options = { ...withViewpoint(task.estimate, cloud), transfer: true, onProgress: show?.('computing') };
       return estimator.estimateNormals(cloud.positions, options);
     });
+    // Another one, so that the memory of the first is free again.
+    estimator.dispose();
+    estimator = await createEstimator({ threads: task.threads });
     const format = task.ascii ? 'ascii' : 'binary_little_endian';
     const additions = { normals, ...(curvature && { curvature }) };
     const ply = await about(task.input, () =>
@@ -250,15 +253,20 @@ function showProgress(title: string) {
   };
 }
 
-function format(report: Report): string {
+function format(report: Report, { method = 'bilinear' }: EstimateOptions): string {
   const { total, ...phases } = report.milliseconds;
   const count = (value: number) => value.toLocaleString('en');
   const short = (value: number) => String(Number(value.toPrecision(4)));
-  const rows = [
-    ['points', count(report.points) + (report.unresolved ? `, ${count(report.unresolved)} without a normal` : '')],
+  const cubes = [
     ['cubes', `${count(report.cells)} of ${report.grid.map(count).join(' x ')}, ${count(report.nodes)} with a node`],
     ['cube edge', `${short(report.cellSize)} (${short(report.scale)} L)`],
     ['nodes used', report.nodesUsed.map((points, nodes) => `${nodes}: ${count(points)}`).join('   ')],
+  ];
+  const rows = [
+    ['points', count(report.points) + (report.unresolved ? `, ${count(report.unresolved)} without a normal` : '')],
+    ['method', method],
+    // The others have none.
+    ...(method === 'bilinear' ? cubes : []),
     ['threads', report.threads + (report.fallbackReason ? ` (${report.fallbackReason})` : '')],
     ['memory', `${short(report.peakBytes / 2 ** 20)} MiB at most`],
     [
@@ -277,7 +285,7 @@ try {
   else {
     const report = await run(task);
     if (task.json) process.stdout.write(`${JSON.stringify(report)}\n`);
-    else if (!task.quiet) process.stdout.write(format(report));
+    else if (!task.quiet) process.stdout.write(format(report, task.estimate));
   }
 } catch (error) {
   const usage = error instanceof UsageError;

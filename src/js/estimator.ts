@@ -1,8 +1,8 @@
-// An estimator: one worker, and the calls that wait for it.
+// An estimator: its workers, and the calls that wait for them.
 import { buffersOf } from './buffers.js';
 import { BilinormalError } from './error.js';
 import { detect } from './features.js';
-import type { Call, Link, Reply, StartWorker } from './protocol.js';
+import type { Call, Link, Reply, Start, StartWorker } from './protocol.js';
 import { kindOf, own, resolve, want } from './source.js';
 import type { Estimator, EstimatorOptions, ReadOptions } from './types.js';
 
@@ -37,8 +37,8 @@ export async function createEstimator(host: Host, options: EstimatorOptions = {}
   return estimator;
 }
 
-/** An estimator that starts its worker with its first call, and a call that does no more than that. */
-export function openEstimator(host: Host, options: EstimatorOptions): [Estimator, () => Promise<unknown>] {
+/** Calls that wait for one worker, which starts with the first of them. */
+function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
   const queue: Job[] = [];
   let running: Job | undefined;
   let link: Link | undefined;
@@ -163,9 +163,24 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
     }
   }
 
+  function dispose() {
+    disposed = new BilinormalError('input', 'the estimator was disposed');
+    for (const job of queue.splice(0)) job.reject(disposed);
+    crash(disposed);
+  }
+
+  return { run, dispose };
+}
+
+/** An estimator that starts a worker when a call needs one, and a call that does no more than that. */
+export function openEstimator(host: Host, options: EstimatorOptions): [Estimator, () => Promise<unknown>] {
+  const core = openQueue(host, options);
+  // What few callers need has a worker of its own, so that the other one keeps its module, which engines make faster
+  // while it runs.
+  const full = openQueue(host, { ...options, full: true });
   const estimator: Estimator = {
     estimateNormals: (positions, options = {}) =>
-      run(options, () => {
+      (/knn|egg/.test(options?.method!) ? full : core).run(options, () => {
         const kind = kindOf(positions);
         want(/^Float(32|64)Array$/.test(kind), 'positions', positions, 'a Float32Array or Float64Array');
         const { length } = positions;
@@ -181,14 +196,14 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
       }),
 
     readPointCloud: (source, options = {}) =>
-      run(options, async (tell) => ({
+      core.run(options, async (tell) => ({
         kind: 'read',
         maxPoints: options.maxPoints,
         file: await resolve(source, host.files, tell, options.signal),
       })),
 
     writePly: (cloud, add, options = {}) =>
-      run(options, async (tell) => {
+      full.run(options, async (tell) => {
         const { format = 'binary_little_endian', signal } = options;
         const ascii = format === 'ascii';
         want(ascii || format === 'binary_little_endian', 'format', format, `'binary_little_endian' or 'ascii'`);
@@ -212,13 +227,12 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
     features: async () => detect(),
 
     dispose() {
-      disposed = new BilinormalError('input', 'the estimator was disposed');
-      for (const job of queue.splice(0)) job.reject(disposed);
-      crash(disposed);
+      core.dispose();
+      full.dispose();
     },
   };
 
-  return [estimator, () => run({}, () => ({ kind: 'hello' }))];
+  return [estimator, () => core.run({}, () => ({ kind: 'hello' }))];
 }
 
 /** JSON has no NaN and no infinity, but an error must say that they came. */

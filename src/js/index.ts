@@ -3,7 +3,8 @@
  * nothing; the first call starts a worker that all calls share.
  *
  * Sub-paths of the package: `bilinormal/three` (a point material), `bilinormal/worker` (the worker's script),
- * `bilinormal/single.wasm` and `bilinormal/threads.wasm` (the two builds, for `createEstimator({ wasmUrl })`).
+ * `bilinormal/single.wasm`, `single-full.wasm`, `threads.wasm` and `threads-full.wasm` (the wasm modules, for
+ * `createEstimator({ wasmUrl })`).
  */
 import { makeApi } from './api.js';
 import { starter } from './link.js';

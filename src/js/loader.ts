@@ -42,10 +42,11 @@ export async function load(start: Start, platform: Platform): Promise<Loaded> {
 }
 
 async function loadThreads(threads: number, start: Start, platform: Platform): Promise<Loaded> {
-  const bundled = () => new URL('./threads/bilinormal_bg.wasm', import.meta.url);
+  const core = () => new URL('./threads/core.wasm', import.meta.url);
+  const full = () => new URL('./threads/full.wasm', import.meta.url);
   const [glue, module]: [ThreadsGlue, WebAssembly.Module] = await Promise.all([
     import('./threads/bilinormal.js' as string),
-    compile(start, 'threads.wasm', bundled, platform),
+    compile(start, 'threads', core, full, platform),
   ]);
   const memory = await begin(glue, module, createMemory(start, true));
   pool.start = platform.startThread;
@@ -55,10 +56,11 @@ async function loadThreads(threads: number, start: Start, platform: Platform): P
 }
 
 async function loadSingle(start: Start, platform: Platform, mode: Mode): Promise<Loaded> {
-  const bundled = () => new URL('./single/bilinormal_bg.wasm', import.meta.url);
+  const core = () => new URL('./single/core.wasm', import.meta.url);
+  const full = () => new URL('./single/full.wasm', import.meta.url);
   const [glue, module]: [Glue, WebAssembly.Module] = await Promise.all([
     import('./single/bilinormal.js' as string),
-    compile(start, 'single.wasm', bundled, platform),
+    compile(start, 'single', core, full, platform),
   ]);
   const memory = await begin(glue, module, createMemory(start, false));
   return { glue, memory, mode };
@@ -71,8 +73,9 @@ async function begin(glue: Glue, module: WebAssembly.Module, [memory, pages]: Re
 }
 
 // Not streamed: that would refuse servers which send .wasm under another media type, for a file this small.
-async function compile({ wasmUrl }: Start, file: string, bundled: () => URL, { load }: Platform) {
-  const url = wasmUrl ? new URL(file, wasmUrl) : bundled();
+async function compile(start: Start, build: string, core: () => URL, full: () => URL, { load }: Platform) {
+  const { wasmUrl } = start;
+  const url = wasmUrl ? new URL(`${build}${start.full ? '-full' : ''}.wasm`, wasmUrl) : start.full ? full() : core();
   try {
     return await WebAssembly.compile(await load(url));
   } catch (error) {

@@ -14,14 +14,20 @@ export interface Progress {
 }
 
 export interface EstimateOptions {
-  /** Default `'bilinear'`, the paper's method; the others are its baselines. */
+  /**
+   * Default `'bilinear'`, the paper's method. The others are its baselines, some ten times as slow: `'knn'` fits a plane
+   * to the k nearest points, `'egg'` a curved surface to the neighbours in the elliptic Gabriel graph.
+   */
   method?: 'bilinear' | 'knn' | 'egg';
   /**
-   * Edge of the cubes, default `'auto'`. `scale`: multiples of the paper's L (Eq. 1), 0.1 to 100; `size`: in the units
+   * Edge of the cubes of `'bilinear'`, default `'auto'`. `scale`: multiples of the paper's L (Eq. 1), 0.1 to 100; `size`: in the units
    * of the input. Small cubes follow detail, large ones average noise away.
    */
   cell?: 'auto' | { scale: number } | { size: number };
-  /** Neighbours of `'knn'` (default 16) and candidates of `'egg'` (default 8). */
+  /**
+   * How many of the nearest points, at least 3: for `'knn'` with the point itself (default 16), for `'egg'` as candidates
+   * besides it (default 8).
+   */
   k?: number;
   /** How signs are chosen. Default `'none'`: deterministic, and nothing more. */
   orient?:
@@ -50,7 +56,7 @@ export interface Report {
   points: number;
   /** Points that got the zero vector: not finite, or without neighbours. */
   unresolved: number;
-  /** Occupied cubes. */
+  /** Occupied cubes. This and all about cubes and nodes is 0 for the baselines, which have none. */
   cells: number;
   /** Cubes with a valid node. */
   nodes: number;
@@ -60,7 +66,7 @@ export interface Report {
   cellSize: number;
   /** Edge of the cubes in multiples of the paper's L. */
   scale: number;
-  /** Points interpolated from 0, 1, 2, 3 and 4 nodes. */
+  /** Points interpolated from 0, 1, 2, 3 and 4 nodes; all from 0 for the baselines. */
   nodesUsed: [number, number, number, number, number];
   /**
    * Each phase in the wasm module, and `total`: from the moment the call left the queue to its result in the calling
@@ -112,8 +118,9 @@ export interface EstimatorOptions {
   /** Default `'auto'`: one for each processor, at most 16. 1 is the single-threaded build. */
   threads?: number | 'auto';
   /**
-   * A folder that holds `single.wasm` and `threads.wasm` (this package exports both under these names), for those who
-   * host them themselves. A relative address counts from the page; in Node, from the working directory.
+   * A folder that holds `single.wasm` and `threads.wasm`, and for `writePly`, `'knn'` and `'egg'` also
+   * `single-full.wasm` and `threads-full.wasm` (this package exports them under these names), for those who host them
+   * themselves. A relative address counts from the page; in Node, from the working directory.
    */
   wasmUrl?: string | URL;
   /** Most memory the wasm module may take, 16 to 4096. Default 4096, or the most that the engine grants. */

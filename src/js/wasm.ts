@@ -1,4 +1,4 @@
-// The border to the wasm module, as the generated glue in single/ and threads/ exports it.
+// The border to the wasm modules, as the generated glue in single/ and threads/ exports it.
 
 /** Hears where a call stands; `fraction` is of the whole call into wasm. */
 export type Tell = (phase: string, fraction: number) => void;

@@ -1,7 +1,6 @@
 //! Blocks of memory that JavaScript fills and reads through views.
 
 use crate::error::Error;
-use crate::points::reserve;
 use bytemuck::AnyBitPattern;
 use wasm_bindgen::prelude::*;
 
@@ -78,7 +77,10 @@ impl Buffer {
             _ => Err(Error::Input(format!("{name} has {} bytes; wanted a multiple of {wanted}", bytes.len()))),
         }
     }
+}
 
+#[cfg(feature = "full")]
+impl Buffer {
     /// Gives the numbers away, without a copy unless they were made as bytes.
     pub(super) fn into_floats(self, name: &str, per_point: usize) -> Result<Vec<f32>, Error> {
         let numbers = self.numbers(name, per_point)?;
@@ -97,9 +99,10 @@ impl Buffer {
     }
 }
 
+#[cfg(feature = "full")]
 fn copy<T: Copy>(items: &[T], name: &str) -> Result<Vec<T>, Error> {
     let mut copied = Vec::new();
-    reserve(&mut copied, items.len(), name)?;
+    crate::points::reserve(&mut copied, items.len(), name)?;
     copied.extend_from_slice(items);
     Ok(copied)
 }

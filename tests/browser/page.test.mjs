@@ -192,7 +192,7 @@ test('another cell, after a number that cannot be one', async () => {
   const again = page.getByRole('button', { name: 'Re-run' });
   await field.fill('-1');
   assert.equal(await field.getAttribute('aria-invalid'), 'true');
-  assert.match(await page.locator('#cell-problem').textContent(), /0\.1 to 100/);
+  assert.match(await page.locator('#problem').textContent(), /0\.1 to 100/);
   assert.ok(await again.isDisabled());
   await field.fill('3');
   await again.click();
@@ -207,6 +207,48 @@ test('another cell, after a number that cannot be one', async () => {
   await page.getByRole('textbox', { name: 'unit of the file' }).fill('0.05');
   await page.keyboard.press('Enter');
   await page.waitForFunction(() => document.querySelector('#facts').textContent.includes('0.05 edge'));
+});
+
+test('another method, after a k that cannot be one', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'ball.ply', spherePly(20_000));
+  await result(page, 'ball.ply');
+  await page.getByRole('radio', { name: 'k nearest' }).check();
+  assert.ok(await page.getByText('Cell of the grid').isHidden());
+  const field = page.getByRole('textbox', { name: 'nearest points' });
+  const again = page.getByRole('button', { name: 'Re-run' });
+  assert.equal(await field.inputValue(), '16');
+  for (const text of ['2', '7.5', '']) {
+    await field.fill(text);
+    assert.match(await page.locator('#problem').textContent(), /at least 3/);
+    assert.ok(await again.isDisabled(), text);
+  }
+  await field.fill('30');
+  await again.click();
+  await page.waitForFunction(() => document.querySelector('#facts').textContent.includes('k = 30'));
+  const { phases, unresolved } = await result(page, 'ball.ply');
+  assert.ok(phases.includes('tree') && phases.includes('normals'), String(phases));
+  assert.equal(unresolved, 0);
+  await page.screenshot({ path: join(ARTEFACTS, 'method.png') });
+
+  // Back to cubes: what the report of the other method knows nothing of begins anew.
+  await page.getByRole('radio', { name: 'Bilinear' }).check();
+  await page.getByRole('radio', { name: '× L' }).check();
+  assert.equal(await page.getByRole('textbox', { name: 'multiples of L' }).inputValue(), '1');
+  await again.click();
+  await page.waitForFunction(() => document.querySelector('#facts').textContent.includes('cubes'));
+});
+
+test('the baselines without threads', async () => {
+  page = await browser.openPage(browser.plain, { viewport: { width: 390, height: 844 } });
+  await drop(page, 'ball.ply', spherePly(20_000));
+  await result(page, 'ball.ply');
+  await page.locator('#panel > summary').click();
+  await page.getByRole('radio', { name: 'EGG' }).check();
+  await page.screenshot({ path: join(ARTEFACTS, 'narrow-method.png') });
+  await page.getByRole('button', { name: 'Re-run' }).click();
+  await page.waitForFunction(() => document.querySelector('#facts').textContent.includes('k = 8'));
+  assert.equal((await result(page, 'ball.ply')).mode, 'single');
 });
 
 test('the sample loads by its address, with colours, and can be turned', async () => {

@@ -15,6 +15,19 @@ impl Cloud {
         let (points, normals): (Vec<_>, Vec<_>) = samples.unzip();
         Self { points: points.concat().into_iter().map(|c| c as f32).collect(), normals }
     }
+
+    /// Moves the points by normally distributed noise; the standard deviation is a share of the bounding box' diagonal,
+    /// as in the PCPNet benchmark.
+    pub fn noisy(mut self, share: f64, seed: u64) -> Self {
+        let extent = [0, 1, 2].map(|axis| {
+            let along = self.points[axis..].iter().step_by(3).copied();
+            f64::from(along.clone().fold(f32::MIN, f32::max) - along.fold(f32::MAX, f32::min))
+        });
+        let deviation = share * extent.iter().map(|e| e * e).sum::<f64>().sqrt();
+        let mut random = Random(seed);
+        self.points.iter_mut().for_each(|c| *c += (deviation * random.gauss()) as f32);
+        self
+    }
 }
 
 /// SplitMix64: the same numbers everywhere.
@@ -60,17 +73,17 @@ pub fn sphere(count: usize, seed: u64) -> Cloud {
     }))
 }
 
-/// A torus of radii 1 and 0.4, with ten times as many points on one side as on the other.
+/// A torus of radii 1 and 0.35, with ten times as many points on one side as on the other.
 pub fn torus(count: usize, seed: u64) -> Cloud {
     let mut random = Random(seed);
     Cloud::of((0..count).map(|_| {
         loop {
             let (a, b) = (TAU * random.unit(), TAU * random.unit());
-            let density = (1.0 + 0.4 * b.cos()) / 1.4 * (0.55 + 0.45 * a.cos());
+            let density = (1.0 + 0.35 * b.cos()) / 1.35 * (0.55 + 0.45 * a.cos());
             if random.unit() < density {
                 let n = [b.cos() * a.cos(), b.cos() * a.sin(), b.sin()];
-                let r = 1.0 + 0.4 * b.cos();
-                return ([r * a.cos(), r * a.sin(), 0.4 * b.sin()], n);
+                let r = 1.0 + 0.35 * b.cos();
+                return ([r * a.cos(), r * a.sin(), 0.35 * b.sin()], n);
             }
         }
     }))
@@ -107,8 +120,8 @@ pub fn terrain(count: usize, seed: u64) -> Cloud {
     let mut random = Random(seed);
     Cloud::of((0..count).map(|_| {
         let (x, y) = (random.signed(), random.signed());
-        let z = 0.2 * (3.0 * x).sin() * (3.0 * y).cos() + 0.02 * (20.0 * x).sin();
-        let dx = 0.6 * (3.0 * x).cos() * (3.0 * y).cos() + 0.4 * (20.0 * x).cos();
+        let z = 0.2 * (3.0 * x).sin() * (3.0 * y).cos() + 0.02 * (19.3 * x).sin();
+        let dx = 0.6 * (3.0 * x).cos() * (3.0 * y).cos() + 0.386 * (19.3 * x).cos();
         let dy = -0.6 * (3.0 * x).sin() * (3.0 * y).sin();
         ([x, y, z], unit([-dx, -dy, 1.0]))
     }))
@@ -118,7 +131,7 @@ pub fn terrain(count: usize, seed: u64) -> Cloud {
 pub fn turn(p: [f64; 3]) -> [f64; 3] {
     let (s, c) = 0.7f64.sin_cos();
     let [x, y, z] = [c * p[0] - s * p[1], s * p[0] + c * p[1], p[2]];
-    let (s, c) = 0.4f64.sin_cos();
+    let (s, c) = 0.6f64.sin_cos();
     [x, c * y - s * z, s * y + c * z]
 }
 
@@ -133,8 +146,11 @@ pub fn unit(a: [f64; 3]) -> [f64; 3] {
 
 /// Runs the estimator without an audience.
 pub fn run(points: &[f32], cell: Cell) -> Estimate {
-    let options = Options { cell, ..Options::default() };
-    estimate(&Points::from_f32(points).unwrap(), &options, &Progress::silent()).unwrap()
+    run_with(&Points::from_f32(points).unwrap(), &Options { cell, ..Options::default() })
+}
+
+pub fn run_with(points: &Points, options: &Options) -> Estimate {
+    estimate(points, options, &Progress::silent()).unwrap()
 }
 
 /// The unsigned angles between estimated and true normals in degrees; 90 for a zero vector.

@@ -57,6 +57,54 @@ test('a sphere: accurate, unit length, and a whole report', async () => {
   assert.ok(Object.keys(phases).length > 2 && sum > 0 && sum <= total, `${sum} of ${total} ms`);
 });
 
+test('the baselines: as accurate as they should be, and a report without cubes', async (context) => {
+  const positions = sphere(30000);
+  const estimators = [1, 2].map((threads) => estimatorFor(context, { threads }));
+  for (const [options, bound] of [
+    [{ method: 'knn' }, 0.009],
+    [{ method: 'knn', k: 100, cell: { scale: 3 } }, 0.009],
+    [{ method: 'egg' }, 0.009],
+    [{ method: 'egg', k: 20 }, 0.004],
+  ]) {
+    const told = [];
+    const onProgress = ({ fraction }) => told.push(fraction);
+    const calls = estimators.map(async (estimator) =>
+      (await estimator).estimateNormals(positions, { ...options, onProgress }),
+    );
+    const [single, threads] = await Promise.all(calls);
+    const name = JSON.stringify(options);
+    assert.ok(sameBits(single.normals, threads.normals), name);
+    assert.equal(single.normals.length, positions.length);
+    const { mean } = deviation(positions, single.normals);
+    assert.ok(mean < bound, `${name}: ${mean}`);
+    const { cells, nodes, grid, cellSize, scale, nodesUsed, unresolved, points, milliseconds } = threads.report;
+    assert.deepEqual([cells, nodes, cellSize, scale, ...grid, unresolved], Array(8).fill(0));
+    assert.deepEqual(nodesUsed, [points, 0, 0, 0, 0]);
+    assert.deepEqual(Object.keys(milliseconds), ['bounds', 'tree', 'normals', 'total']);
+    assert.equal(told.at(-1), 1);
+  }
+});
+
+test('each method has its own worker: calls of both end, an abort of one leaves the other, dispose ends both', async () => {
+  const estimator = await createEstimator({ threads: 1 });
+  const positions = sphere(100000);
+  const abort = new AbortController();
+  const reason = new Error('enough');
+  const stopped = estimator.estimateNormals(positions, {
+    method: 'knn',
+    k: 200,
+    signal: abort.signal,
+    onProgress: ({ phase }) => phase === 'normals' && abort.abort(reason),
+  });
+  const kept = estimator.estimateNormals(positions);
+  await assert.rejects(stopped, (error) => error === reason);
+  assert.equal((await kept).report.unresolved, 0);
+  assert.equal((await estimator.estimateNormals(sphere(1000), { method: 'egg' })).report.unresolved, 0);
+  const pending = [{}, { method: 'knn' }].map((options) => estimator.estimateNormals(positions, options));
+  estimator.dispose();
+  for (const call of pending) await assert.rejects(call, failing('input', /disposed/));
+});
+
 test('Node has threads, and says so', async () => {
   assert.deepEqual(await features(), { threads: true, simd: true, crossOriginIsolated: true });
   const { report } = await estimateNormals(sphere(1000));
@@ -481,13 +529,16 @@ test('an estimator finds wasm files that are hosted elsewhere', async (context) 
   const { copyFileSync, mkdirSync } = await import('node:fs');
   mkdirSync(folder);
   for (const build of ['single', 'threads']) {
-    copyFileSync(join(home, 'dist', build, 'bilinormal_bg.wasm'), join(folder, `${build}.wasm`));
+    copyFileSync(join(home, 'dist', build, 'core.wasm'), join(folder, `${build}.wasm`));
+    copyFileSync(join(home, 'dist', build, 'full.wasm'), join(folder, `${build}-full.wasm`));
   }
   for (const threads of [1, 2]) {
     for (const wasmUrl of [pathToFileURL(folder), `${pathToFileURL(folder)}/`]) {
       const estimator = await estimatorFor(context, { threads, wasmUrl });
-      const { report } = await estimator.estimateNormals(sphere(100));
-      assert.equal(report.threads, threads);
+      for (const method of ['bilinear', 'knn']) {
+        const { report } = await estimator.estimateNormals(sphere(100), { method });
+        assert.equal(report.threads, threads);
+      }
     }
   }
 });

@@ -47,6 +47,19 @@ test('a file gains normals, and a report of one screen is printed', () => {
   assert.deepEqual(leftovers(), []);
 });
 
+test('the other methods, and a report without cubes', () => {
+  for (const [method, more, worst] of [
+    ['knn', ['--k', '12'], 3],
+    ['egg', [], 5],
+  ]) {
+    const { status, stdout, stderr } = run(['sphere.ply', '-o', 'method.ply', '--method', method, ...more]);
+    assert.deepEqual({ status, stderr }, { status: 0, stderr: '' });
+    assert.match(stdout, new RegExp(`method +${method}\n`));
+    assert.doesNotMatch(stdout, /cube|nodes/);
+    assert.ok(deviation(positions, normalsOf(written('method.ply'))).worst < worst);
+  }
+});
+
 test('--json prints the report as one line, --quiet nothing', () => {
   const { stdout } = run([
     'sphere.ply',
@@ -103,6 +116,7 @@ test('wrong usage ends with 2, one line and a hint', () => {
     [['a.ply', 'b.ply', '-o', 'c.ply'], /b\.ply/],
     [['a.ply', '-o', 'b.ply', '--magic'], /--magic/],
     [['a.ply', '-o', 'b.ply', '--method', 'magic'], /--method is magic; wanted bilinear, knn, egg/],
+    [['a.ply', '-o', 'b.ply', '--method', 'knn', '--k', '2'], /--k is 2; wanted a whole number of at least 3/],
     [['a.ply', '-o', 'b.ply', '--cell-scale', 'big'], /--cell-scale is big; wanted a number/],
     [['a.ply', '-o', 'b.ply', '--cell-scale', '1', '--cell-size', '1'], /exclude/],
     [['a.ply', '-o', 'b.ply', '--cell', 'huge'], /--cell is huge; wanted auto/],

@@ -41,7 +41,7 @@ async function faulty({ load = '', run = '' }) {
   const empty = Uint8Array.of(0, 97, 115, 109, 1, 0, 0, 0);
   for (const [build, glue] of Object.entries({ single, threads: threads({ load, run }) })) {
     writeFileSync(join(home, 'dist', build, 'bilinormal.js'), glue);
-    writeFileSync(join(home, 'dist', build, 'bilinormal_bg.wasm'), empty);
+    writeFileSync(join(home, 'dist', build, 'core.wasm'), empty);
   }
   return { home, ...(await open('bilinormal')) };
 }

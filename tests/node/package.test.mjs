@@ -32,9 +32,12 @@ test('every export is there, and nothing that only the build needs', () => {
 
 test('wasm files can be addressed by name', () => {
   const { stdout } =
-    node(`console.log(import.meta.resolve('bilinormal/single.wasm'), import.meta.resolve('bilinormal/threads.wasm'),
-    import.meta.resolve('bilinormal/worker'))`);
-  assert.match(stdout, /single\/bilinormal_bg\.wasm .*threads\/bilinormal_bg\.wasm .*dist\/worker-node\.js/);
+    node(`const names = ['single.wasm', 'single-full.wasm', 'threads.wasm', 'threads-full.wasm', 'worker'];
+    console.log(...names.map((name) => import.meta.resolve('bilinormal/' + name)));`);
+  assert.match(
+    stdout,
+    /single\/core\.wasm .*single\/full\.wasm .*threads\/core\.wasm .*threads\/full\.wasm .*worker-node\.js/,
+  );
 });
 
 test('importing does nothing, and a process that is done ends without a word', () => {

@@ -2,7 +2,8 @@
 import { drawHero } from './hero';
 import { element, showState } from './panel';
 import { createSession, type Session } from './session';
-import { createStore, type CellKind, type Store } from './state';
+import { METHODS, type CellKind, type Method } from './options';
+import { createStore, type Store } from './state';
 import { missing } from './support';
 import { createViewer, type Margins, type Shading, type Up, type Viewer } from './viewer';
 
@@ -97,13 +98,16 @@ function takeControls(session: Session, viewer: Viewer): void {
   };
   choose('shading', (value) => store.set({ shading: value as Shading }));
   choose('up', (value) => store.set({ up: value as Up }));
+  choose('method', (value) => store.set({ method: value as Method, kText: String(METHODS[value as Method].k) }));
   choose('cell', (value) => chooseCell(store, value as CellKind));
 
   const size = element<HTMLInputElement>('#point-size');
   size.addEventListener('input', () => store.set({ pointSize: 2 ** size.valueAsNumber }));
   const cell = element<HTMLInputElement>('#cell-value');
   cell.addEventListener('input', () => store.set({ cellText: cell.value }));
-  element<HTMLFormElement>('#cell').addEventListener('submit', (event) => {
+  const k = element<HTMLInputElement>('#k-value');
+  k.addEventListener('input', () => store.set({ kText: k.value }));
+  element<HTMLFormElement>('#options').addEventListener('submit', (event) => {
     event.preventDefault();
     void session.estimate();
   });
@@ -120,6 +124,7 @@ function takeControls(session: Session, viewer: Viewer): void {
 /** A new way to give the cell starts from the one that was just used. */
 function chooseCell(to: Store, cellKind: CellKind): void {
   const { report } = to.state;
-  const used = cellKind === 'scale' ? (report?.scale ?? 1) : report?.cellSize;
-  to.set({ cellKind, cellText: used === undefined ? '' : String(Number(used.toPrecision(3))) });
+  // The baselines, which have no cubes, report zero.
+  const used = cellKind === 'scale' ? report?.scale || 1 : report?.cellSize;
+  to.set({ cellKind, cellText: used ? String(Number(used.toPrecision(3))) : '' });
 }

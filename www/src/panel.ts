@@ -1,8 +1,8 @@
 // Draws the state into the document. Nothing is remembered here: every part is a function of the state.
 import type { Report } from 'bilinormal';
-import { parseCell } from './cell';
 import { count, duration, measure, phaseName, plural } from './format';
-import type { Scan, State, Store } from './state';
+import { METHODS, parseOptions } from './options';
+import type { State, Store } from './state';
 
 export function element<T extends HTMLElement>(selector: string): T {
   const found = document.querySelector<T>(selector);
@@ -46,10 +46,10 @@ export function showState(store: Store): void {
     radio('shading', 'shaded').disabled = radio('shading', 'normals').disabled = !scan?.hasNormals && !busy;
     element<HTMLButtonElement>('[data-do=save]').disabled = !scan?.hasNormals || busy;
 
-    showCell(state, busy);
+    showOptions(state, busy);
     showError(error);
     showJob(state);
-    if (before?.scan !== scan || before?.report !== report) showResult(scan, report);
+    if (before?.scan !== scan || before?.report !== report) showResult(state);
   });
 }
 
@@ -59,17 +59,27 @@ function check(name: string, value: string): void {
   radio(name, value).checked = true;
 }
 
-function showCell({ cellKind, cellText, scan }: State, busy: boolean): void {
+function showOptions(state: State, busy: boolean): void {
+  const { method, cellKind, cellText, kText, scan } = state;
+  check('method', method);
   check('cell', cellKind);
-  const input = element<HTMLInputElement>('#cell-value');
-  input.hidden = cellKind === 'auto';
+  const parsed = parseOptions(state);
+  const problem = 'problem' in parsed ? parsed.problem : '';
+
+  element('#cell').hidden = method !== 'bilinear';
+  const cell = element<HTMLInputElement>('#cell-value');
+  cell.hidden = method !== 'bilinear' || cellKind === 'auto';
   const label = cellKind === 'scale' ? 'Cell edge in multiples of L' : 'Cell edge in the unit of the file';
-  input.setAttribute('aria-label', label);
-  if (input.value !== cellText) input.value = cellText;
-  const choice = parseCell(cellKind, cellText);
-  const problem = 'problem' in choice ? choice.problem : '';
-  input.setAttribute('aria-invalid', String(problem !== ''));
-  const note = element('#cell-problem');
+  cell.setAttribute('aria-label', label);
+  element('#k').hidden = method === 'bilinear';
+  for (const [input, text] of [
+    [cell, cellText],
+    [element<HTMLInputElement>('#k-value'), kText],
+  ] as const) {
+    if (input.value !== text) input.value = text;
+    input.setAttribute('aria-invalid', String(problem !== ''));
+  }
+  const note = element('#problem');
   note.hidden = problem === '';
   note.textContent = problem;
   const again = element<HTMLButtonElement>('#again');
@@ -93,7 +103,17 @@ function showJob({ job }: State): void {
   else bar.value = job.fraction;
 }
 
-function showResult(scan: Scan | undefined, report: Report | undefined): void {
+/** What the method tells of itself. */
+function factsOf(report: Report, used: State['used']): HTMLElement[] {
+  if (used && used.method !== 'bilinear') return [fact(METHODS[used.method].name, `k = ${count(used.k)}`)];
+  return [
+    fact(count(report.cells), 'cubes'),
+    fact(count(report.nodes), 'nodes'),
+    fact(measure(report.cellSize), `edge, ${measure(report.scale)} L`),
+  ];
+}
+
+function showResult({ scan, report, used }: State): void {
   element('#status').hidden = scan === undefined;
   if (!scan) return;
   element('#total').textContent = report ? duration(report.milliseconds.total) : count(scan.points);
@@ -108,10 +128,8 @@ function showResult(scan: Scan | undefined, report: Report | undefined): void {
   if (!report) return;
 
   facts.append(
-    fact(count(report.cells), 'cubes'),
-    fact(count(report.nodes), 'nodes'),
+    ...factsOf(report, used),
     fact(count(report.unresolved), 'unresolved'),
-    fact(measure(report.cellSize), `edge, ${measure(report.scale)} L`),
     fact(count(report.threads), report.threads === 1 ? 'thread' : 'threads'),
   );
   facts.dataset['mode'] = report.mode;

@@ -2,14 +2,14 @@
 // viewer.setNormals -> report. One job runs at a time; a new one cancels it.
 import { estimateNormals, readPointCloud, writePly } from 'bilinormal';
 import { boundsOf, guessUp } from './bounds';
-import { parseCell } from './cell';
+import { METHODS, parseOptions } from './options';
 import type { Store } from './state';
 import type { Viewer } from './viewer';
 
 export interface Session {
   open(file: File): Promise<void>;
   openSample(): Promise<void>;
-  /** Computes the normals of the cloud on the screen again, with the cell that is set now. */
+  /** Computes the normals of the cloud on the screen again, with the options that are set now. */
   estimate(): Promise<void>;
   save(): Promise<void>;
   cancel(): void;
@@ -67,23 +67,24 @@ export function createSession(store: Store, viewer: Viewer): Session {
     viewer.show(cloud, bounds, up);
     const scan = { name: file.name, points: cloud.count, hasColors, hasNormals: false, readMilliseconds };
     // An edge length belongs to the unit of the file before.
-    store.set({ scan, report: undefined, up, shading, cellKind: 'auto', cellText: '' });
+    store.set({ scan, report: undefined, used: undefined, up, shading, cellKind: 'auto', cellText: '' });
   }
 
   async function shade(step: Step): Promise<void> {
-    const { scan, cellKind, cellText } = store.state;
-    const choice = parseCell(cellKind, cellText);
+    const { scan } = store.state;
+    const parsed = parseOptions(store.state);
     if (!shown || !scan) return;
-    if ('problem' in choice) throw new Error(choice.problem);
+    if ('problem' in parsed) throw new Error(parsed.problem);
+    const { method = 'bilinear', k = 0 } = parsed.options;
     const { normals, report } = await estimateNormals(shown.positions, {
-      cell: choice.cell,
+      ...parsed.options,
       signal: step.signal,
-      onProgress: step.begin('Computing normals'),
+      onProgress: step.begin(`Computing normals${method === 'bilinear' ? '' : `, ${METHODS[method].name}`}`),
     });
     step.signal.throwIfAborted();
     shown.normals = normals;
     viewer.setNormals(normals);
-    store.set({ scan: { ...scan, hasNormals: true }, report });
+    store.set({ scan: { ...scan, hasNormals: true }, report, used: { method, k } });
   }
 
   return {

@@ -1,9 +1,8 @@
 // Everything the page shows besides the cloud itself, in one place. The session and the controls write it, `set` tells
 // the listeners, and the panel draws it: nothing reads the document to find out what is going on.
 import type { Report } from 'bilinormal';
+import type { Method, OptionsForm } from './options';
 import type { Shading, Up } from './viewer';
-
-export type CellKind = 'auto' | 'scale' | 'size';
 
 /** The cloud on the screen. */
 export interface Scan {
@@ -21,21 +20,20 @@ export interface Job {
   fraction: number | undefined;
 }
 
-export interface State {
+export interface State extends OptionsForm {
   /** Whether files can be taken: false until the browser has been looked at. */
   ready: boolean;
   /** Why this browser cannot run the page at all. */
   unsupported: string | undefined;
   scan: Scan | undefined;
   report: Report | undefined;
+  /** What the report is about. */
+  used: { method: Method; k: number } | undefined;
   job: Job | undefined;
   error: string | undefined;
   shading: Shading;
   pointSize: number;
   up: Up;
-  cellKind: CellKind;
-  /** As typed; `cell.ts` says whether it is a number that can be used. */
-  cellText: string;
 }
 
 export interface Store {
@@ -50,13 +48,16 @@ export function createStore(): Store {
     unsupported: undefined,
     scan: undefined,
     report: undefined,
+    used: undefined,
     job: undefined,
     error: undefined,
     shading: 'shaded',
     pointSize: 1,
     up: 'y',
+    method: 'bilinear',
     cellKind: 'auto',
     cellText: '',
+    kText: '',
   };
   const listeners: ((state: Readonly<State>) => void)[] = [];
   return {
