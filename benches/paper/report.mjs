@@ -162,7 +162,7 @@ function measuredBar(rows) {
 function without(clouds) {
   const missing = Object.keys(VARIANTS).map((variant) => {
     const shares = clouds.map(({ methods }) => methods[variant].unresolved / methods[variant].points);
-    return shares.some((share) => share > 0) && `${label(variant)} ${range(shares, percent)}`;
+    return shares.some((share) => share > 0) && `${label(variant)}: ${range(shares, percent)}`;
   });
   const named = missing.filter(Boolean).join(', ');
   return named ? `Points that get no normal (in errors a right angle): ${named}.` : 'Every point gets a normal.';
