@@ -49,12 +49,12 @@ export function chart({ title, x, y, series, band }) {
   });
   const [from, to] = band ? [round(across(band.from)), round(across(band.to))] : [];
   const shade = `<rect x="${from}" y="${PLOT.top}" width="${to - from}" height="${PLOT.bottom - PLOT.top}" fill="#f1ead8"/>`;
-  const area = band && [shade, text((from + to) / 2, PLOT.top + 18, band.label, 'middle')].join('');
+  const area = band ? [shade, text((from + to) / 2, PLOT.top + 18, band.label, 'middle')] : [];
   return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${WIDTH} ${HEIGHT}" width="${WIDTH}" height="${HEIGHT}" role="img" font-family="system-ui, sans-serif" font-size="13" fill="#222">
 <title>${escape(title)}</title>
 <rect width="${WIDTH}" height="${HEIGHT}" rx="8" fill="#fff"/>
 <text x="${PLOT.left}" y="26" font-size="15" font-weight="600">${escape(title)}</text>
-${[area, ...grid, ...lines].filter(Boolean).join('\n')}
+${[...area.slice(0, 1), ...grid, ...lines, ...area.slice(1)].join('\n')}
 <rect x="${PLOT.left}" y="${PLOT.top}" width="${PLOT.right - PLOT.left}" height="${PLOT.bottom - PLOT.top}" fill="none" stroke="#888"/>
 ${text((PLOT.left + PLOT.right) / 2, HEIGHT - 14, x.label, 'middle')}
 <text transform="translate(20 ${middle}) rotate(-90)" text-anchor="middle">${escape(y.label)}</text>
