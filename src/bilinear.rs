@@ -2,11 +2,11 @@
 
 use crate::error::Error;
 use crate::grid::{Grid, Placed, STEPS, Surroundings};
-use crate::lattice::cube_centre;
+use crate::lattice::{cube_centre, octant_in_brick};
 use crate::nodes::Node;
 use crate::normals::Normals;
 use crate::progress::Stage;
-use glam::{Vec3, Vec4};
+use glam::{Vec3, Vec4, Vec4Swizzles};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// Interpolates all points; those outside the grid get the zero vector. One pass over the sorted points.
@@ -80,7 +80,6 @@ struct Cube<'a> {
     nodes: &'a GoodNodes,
     /// The place of the cube among the 6x6x6.
     place: usize,
-    centre: Vec3,
     /// The plane of the cube, whether or not the cube holds its node; zero if it has none.
     own: Vec3,
     /// Where the own normal is largest, then u and v.
@@ -102,7 +101,7 @@ impl<'a> Cube<'a> {
             1 => ([1, 2, 0], [6, 36, 1]),
             _ => ([2, 0, 1], [36, 1, 6]),
         };
-        let mut cube = Self { nodes, place, centre, own: own.normal, axes, strides, columns: [[0; 9]; 2] };
+        let mut cube = Self { nodes, place, own: own.normal, axes, strides, columns: [[0; 9]; 2] };
         cube.fill_columns(own.normal.dot(centre) + own.offset);
         cube
     }
@@ -129,34 +128,41 @@ impl<'a> Cube<'a> {
         if node.normal == Vec3::ZERO { f32::INFINITY } else { (self.own.dot(node.position) - offset).abs() }
     }
 
-    /// Calls `resolve(normal, nodes used, number of the point)` for each point of the cube.
+    /// Calls `resolve(normal, nodes used, number of the point)` for each point of the cube. The points of an octant, which
+    /// lie one after the other, share its nodes; four at a time are computed at once.
+    #[inline(always)]
     fn interpolate(&self, points: &[Placed], mut resolve: impl FnMut(Vec3, usize, u32)) {
-        // What the points of each octant share, from when the first of them asks.
-        let mut octants = [const { None }; 8];
-        let [axis, axis_u, axis_v] = self.axes;
-        let centre = self.centre.to_array();
-        for placed in points {
-            let point = placed.local.to_array();
-            let is_above = |axis: usize| usize::from(point[axis] >= centre[axis]);
-            let number = is_above(axis_u) + 2 * is_above(axis_v) + 4 * is_above(axis);
-            let octant = octants[number].get_or_insert_with(|| self.octant(number));
-            let normal = match octant.used {
-                0 => self.nearest(placed.local),
-                _ => octant.normal(point[axis_u], point[axis_v]).unwrap_or(self.own),
-            };
-            resolve(normal, octant.used, placed.point);
+        let mut rest = points;
+        while let Some(first) = rest.first() {
+            let number = octant_in_brick(first.local);
+            let length = rest.iter().take_while(|placed| octant_in_brick(placed.local) == number).count();
+            let (points, others) = rest.split_at(length);
+            rest = others;
+            let octant = self.octant(number);
+            if octant.used == 0 {
+                points.iter().for_each(|placed| resolve(self.nearest(placed.local), 0, placed.point));
+                continue;
+            }
+            let [_, u, v] = self.axes;
+            for four in points.chunks(4) {
+                let [x, y, z] = octant.normals(along(four, u), along(four, v), self.own).map(|lanes| lanes.to_array());
+                for (i, placed) in four.iter().enumerate() {
+                    resolve(Vec3::new(x[i], y[i], z[i]), octant.used, placed.point);
+                }
+            }
         }
     }
 
-    /// Bits 0, 1 and 2 of the number tell whether the octant lies above the centre along u, v and the axis.
+    /// The octant with a number as [`octant_in_brick`] gives it.
     #[inline(always)]
-    fn octant(&self, number: usize) -> Octant {
+    fn octant(&self, number: u32) -> Octant {
         if self.own == Vec3::ZERO {
             // Without an own plane there is no axis and no common side: the points take the nearest node.
             return Octant::new(None, None, None, None);
         }
-        let columns = &self.columns[number >> 2];
-        let (far, row) = (if number & 1 == 1 { 5 } else { 3 }, if number & 2 == 2 { 7 } else { 1 });
+        let is_above = self.axes.map(|axis| (number >> axis & 1) as usize);
+        let columns = &self.columns[is_above[0]];
+        let (far, row) = (3 + 2 * is_above[1], 1 + 6 * is_above[2]);
         let seen = |column: usize| self.see(columns[column]);
         Octant::new(seen(4), seen(far), seen(row), seen(row + far - 4))
     }
@@ -184,6 +190,13 @@ impl<'a> Cube<'a> {
         }
         nearest.1
     }
+}
+
+/// One coordinate of up to four points; where there are fewer, the last stands in for the others.
+#[inline(always)]
+fn along(points: &[Placed], axis: usize) -> Vec4 {
+    let at = |i: usize| AsRef::<[f32; 3]>::as_ref(&points[i.min(points.len() - 1)].local)[axis];
+    Vec4::new(at(0), at(1), at(2), at(3))
 }
 
 /// A node as the points of a cube see it.
@@ -218,10 +231,18 @@ impl Pair {
         })
     }
 
-    /// Normal and v between the two nodes (paper, Eq. 15 and 16).
+    /// x, y and z of the normal, and v, between the two nodes, at four places (paper, Eq. 15 and 16).
     #[inline(always)]
-    fn at(&self, u: f32) -> Vec4 {
-        self.first + self.gain * clamp((u - self.u) * self.scale)
+    fn at(&self, u: Vec4) -> [Vec4; 4] {
+        let weight = clamp((u - Vec4::splat(self.u)) * Vec4::splat(self.scale));
+        let (first, gain) = (self.first, self.gain);
+        // One by one: by index it would take four times as long in WebAssembly.
+        [
+            first.xxxx() + gain.xxxx() * weight,
+            first.yyyy() + gain.yyyy() * weight,
+            first.zzzz() + gain.zzzz() * weight,
+            first.wwww() + gain.wwww() * weight,
+        ]
     }
 }
 
@@ -242,27 +263,28 @@ impl Octant {
         Self { pairs, used }
     }
 
-    /// The interpolated unit normal (paper, Eq. 15 to 17); `None` where the nodes cancel each other.
+    /// x, y and z of the interpolated unit normals at four places (paper, Eq. 15 to 17); the own normal where the nodes
+    /// cancel each other.
     #[inline(always)]
-    fn normal(&self, u: f32, v: f32) -> Option<Vec3> {
-        let (a, b) = (self.pairs[0].at(u), self.pairs[1].at(u));
-        let length = b.w - a.w;
-        let weight = if length == 0.0 { 0.5 } else { clamp((v - a.w) / length) };
-        let normal = (a + (b - a) * weight).truncate();
-        let square = normal.length_squared();
-        (square > 1e-12).then(|| normal * (1.0 / square.sqrt()))
+    fn normals(&self, u: Vec4, v: Vec4, own: Vec3) -> [Vec4; 3] {
+        let ([ax, ay, az, av], [bx, by, bz, bv]) = (self.pairs[0].at(u), self.pairs[1].at(u));
+        let length = bv - av;
+        let weight = clamp((v - av) / length);
+        let weight = Vec4::select(length.cmpeq(Vec4::ZERO), Vec4::splat(0.5), weight);
+        let (x, y, z) = (ax + (bx - ax) * weight, ay + (by - ay) * weight, az + (bz - az) * weight);
+        let square = x * x + y * y + z * z;
+        let is_long = square.cmpgt(Vec4::splat(1e-12));
+        let scale = Vec4::ONE / square.sqrt();
+        [
+            Vec4::select(is_long, x * scale, Vec4::splat(own.x)),
+            Vec4::select(is_long, y * scale, Vec4::splat(own.y)),
+            Vec4::select(is_long, z * scale, Vec4::splat(own.z)),
+        ]
     }
 }
 
-/// Between 0 and 1. Comparisons, because `f32::clamp` is slow in WebAssembly.
+/// Between 0 and 1.
 #[inline(always)]
-#[allow(clippy::manual_clamp)]
-fn clamp(weight: f32) -> f32 {
-    if weight < 0.0 {
-        0.0
-    } else if weight > 1.0 {
-        1.0
-    } else {
-        weight
-    }
+fn clamp(weight: Vec4) -> Vec4 {
+    weight.max(Vec4::ZERO).min(Vec4::ONE)
 }

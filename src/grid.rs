@@ -2,7 +2,7 @@
 
 use crate::bricks::{Bricks, OUTSIDE, set_bits};
 use crate::error::Error;
-use crate::lattice::{Lattice, cube_centre, cube_in_brick};
+use crate::lattice::{Lattice, cube_centre, cube_in_brick, octant_in_brick};
 use crate::parallel::{self, Filling, Scatter};
 use crate::pca::Moments;
 use crate::points::{CHUNK, Points, reserve};
@@ -22,8 +22,8 @@ pub(crate) struct Placed {
 
 /// The cubes that hold points, brick by brick, and their points, cube by cube.
 ///
-/// Bricks lie in the order of [`Bricks`], the cubes of a brick in the order of their bits, the points of a cube in the
-/// order of the input: the same for any number of threads.
+/// Bricks lie in the order of [`Bricks`], the cubes of a brick in the order of their bits, the points of a cube by
+/// octant, those of an octant in the order of the input: the same for any number of threads.
 pub(crate) struct Grid {
     pub bricks: Bricks,
     /// For each brick, one bit for each of its 64 cubes that is occupied.
@@ -170,37 +170,44 @@ fn sort_by_brick(
     Ok((first_point, unsafe { placed.complete() }))
 }
 
-/// Sorts the points of each brick by cube, stable; also answers for each brick which cubes are occupied.
+/// Sorts the points of each brick by cube and octant, stable; also answers for each brick which cubes are occupied.
 fn sort_by_cube(by_brick: &[Placed], first_point: &[u32], stage: &Stage) -> Result<(Vec<Placed>, Vec<u64>), Error> {
     let placed = Filling::new(by_brick.len(), "the sorted points")?;
     let masks = Filling::new(first_point.len() - 1, "the grid")?;
     let blocks = blocks(first_point);
     stage.run(blocks.len(), &|block| {
+        let mut next = [0; 8 * 64];
         for brick in blocks[block].clone() {
             let range = first_point[brick] as usize..first_point[brick + 1] as usize;
             // SAFETY: a brick belongs to one block, and its points and its mask to no other brick.
-            unsafe { masks.write(brick, sort_brick(&by_brick[range.clone()], placed.slice(range))) };
+            unsafe { masks.write(brick, sort_brick(&by_brick[range.clone()], placed.slice(range), &mut next)) };
         }
     })?;
     // SAFETY: the blocks hold all bricks, and these all points; `sort_brick` writes as many points as it reads.
     unsafe { Ok((placed.complete(), masks.complete())) }
 }
 
-/// A counting sort over the 64 cubes of a brick; answers which of them are occupied.
-fn sort_brick(points: &[Placed], sorted: &mut [MaybeUninit<Placed>]) -> u64 {
-    let mut next = [0u32; 64];
+/// A counting sort over the octants of the 64 cubes of a brick; answers which cubes are occupied. All of `next` is zero
+/// before and after: where few cubes are occupied, to clear the whole would take longer than to sort.
+fn sort_brick(points: &[Placed], sorted: &mut [MaybeUninit<Placed>], next: &mut [u32; 8 * 64]) -> u64 {
+    let mut mask = 0;
     for point in points {
-        next[cube_in_brick(point.local) as usize] += 1;
+        let octant = octant_in_brick(point.local);
+        next[octant as usize] += 1;
+        mask |= 1 << (octant / 8);
     }
-    let (mut mask, mut total) = (0, 0);
-    for (cube, next) in next.iter_mut().enumerate() {
-        mask |= u64::from(*next > 0) << cube;
-        total += std::mem::replace(next, total);
+    let octants = |cube: u32| 8 * cube as usize..8 * cube as usize + 8;
+    let mut total = 0;
+    for octant in set_bits(mask).flat_map(octants) {
+        total += std::mem::replace(&mut next[octant], total);
     }
     for point in points {
-        let next = &mut next[cube_in_brick(point.local) as usize];
+        let next = &mut next[octant_in_brick(point.local) as usize];
         sorted[*next as usize].write(*point);
         *next += 1;
+    }
+    for cube in set_bits(mask) {
+        next[octants(cube)].fill(0);
     }
     mask
 }

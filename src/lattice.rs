@@ -62,6 +62,15 @@ pub(crate) fn cube_in_brick(local: Vec3) -> u32 {
     cube.x + 4 * cube.y + 16 * cube.z
 }
 
+/// The octant of a place in a brick: eight times its cube, and bits 0, 1 and 2 tell whether it is not below the cube's
+/// centre along x, y and z.
+#[inline]
+pub(crate) fn octant_in_brick(local: Vec3) -> u32 {
+    let half = (local * 2.0).as_uvec3();
+    let (cube, above) = (half >> 1u32, half & 1u32);
+    8 * (cube.x + 4 * cube.y + 16 * cube.z) + above.x + 2 * above.y + 4 * above.z
+}
+
 /// The centre of the cube with bit `bit`, in the brick.
 #[inline]
 pub(crate) fn cube_centre(bit: u32) -> Vec3 {

@@ -106,8 +106,13 @@ mod tests {
                     let node = nodes.next().unwrap();
                     let place = 4 * grid.bricks.places[brick]
                         + IVec3::new(bit as i32 & 3, bit as i32 >> 2 & 3, bit as i32 >> 4);
-                    let own: Vec<u32> = (0..3000).filter(|i| cube(&positions[*i as usize]) == place).collect();
-                    assert_eq!(points.iter().map(|p| p.point).collect::<Vec<_>>(), own, "sorted, in the input's order");
+                    let mut own: Vec<u32> = (0..3000).filter(|i| cube(&positions[*i as usize]) == place).collect();
+                    own.sort_by_key(|i| {
+                        let above = (positions[*i as usize].as_dvec3() / edge).fract().cmpge(DVec3::splat(0.5));
+                        above.bitmask()
+                    });
+                    let sorted: Vec<u32> = points.iter().map(|p| p.point).collect();
+                    assert_eq!(sorted, own, "by octant, and in the input's order");
 
                     let centre = (place.as_dvec3() + 0.5) * edge;
                     let near: Vec<DVec3> = positions
