@@ -14,9 +14,9 @@ mod read;
 mod write;
 
 pub use buffer::Buffer;
-pub use estimate::{Estimation, estimate};
+pub use estimate::estimate;
 pub use memory::set_maximum;
-pub use read::{Cloud, read_ply};
+pub use read::read_ply;
 #[cfg(feature = "threads")]
 pub use wasm_bindgen_rayon::init_thread_pool;
 #[cfg(feature = "full")]

@@ -46,9 +46,9 @@ async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Plat
     return buffer;
   }
 
-  function take(buffer?: Buffer): ArrayBuffer | undefined {
-    const bytes = buffer && view(buffer).slice().buffer;
-    buffer?.free();
+  function take(buffer: Buffer): ArrayBuffer {
+    const bytes = view(buffer).slice().buffer;
+    buffer.free();
     return bytes;
   }
 
@@ -91,28 +91,18 @@ async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Plat
       const positions = put(call.positions);
       // Not kept in JavaScript memory meanwhile: 12 or 24 bytes a point.
       delete (call as Partial<typeof call>).positions;
-      const estimation = glue.estimate(positions, call.double, call.options, tell);
-      const normals = new Float32Array(take(estimation.takeNormals())!);
-      const report = { ...estimation.report, ...mode };
-      estimation.free();
-      return { normals, report };
+      const { normals, report } = glue.estimate(positions, call.double, call.options, tell);
+      return { normals: new Float32Array(take(normals)), report: { ...report, ...mode } };
     }
     case 'read': {
       const cloud = glue.readPly(await putFile(call.file), call.maxPoints, tellRest);
-      const { count, origin, format, properties, comments } = cloud;
-      const positions = new Float32Array(take(cloud.takePositions())!);
-      const normals = take(cloud.takeNormals());
-      const colors = take(cloud.takeColors());
-      const intensity = take(cloud.takeIntensity());
-      cloud.free();
+      const { positions, normals, colors, intensity } = cloud;
       return {
-        count,
-        positions,
-        origin: [...origin],
-        ...(normals && { normals: new Float32Array(normals) }),
-        ...(colors && { colors: new Uint8Array(colors) }),
-        ...(intensity && { intensity: new Float32Array(intensity) }),
-        source: { format, properties, comments },
+        ...cloud,
+        positions: new Float32Array(take(positions)),
+        ...(normals && { normals: new Float32Array(take(normals)) }),
+        ...(colors && { colors: new Uint8Array(take(colors)) }),
+        ...(intensity && { intensity: new Float32Array(take(intensity)) }),
       };
     }
     case 'write': {

@@ -11,22 +11,19 @@ export interface Buffer {
 }
 
 export interface Estimation {
-  takeNormals(): Buffer;
-  readonly report: object;
-  free(): void;
+  normals: Buffer;
+  report: object;
 }
 
+/** A point cloud as it leaves the worker, but with buffers in place of its arrays. */
 export interface Cloud {
-  readonly count: number;
-  readonly origin: Float64Array;
-  readonly format: string;
-  readonly properties: string[];
-  readonly comments: string[];
-  takePositions(): Buffer;
-  takeNormals(): Buffer | undefined;
-  takeColors(): Buffer | undefined;
-  takeIntensity(): Buffer | undefined;
-  free(): void;
+  count: number;
+  origin: number[];
+  source: object;
+  positions: Buffer;
+  normals?: Buffer;
+  colors?: Buffer;
+  intensity?: Buffer;
 }
 
 /** A build's exports. Calls consume the buffers they are given. */

@@ -1,29 +1,21 @@
 //! Normals over the border.
 
 use super::{Buffer, call, memory, options, set};
-use crate::error::Error;
 use crate::estimate::{Estimate, Report};
 use crate::points::Points;
 use js_sys::{Array, Function, Object};
 use wasm_bindgen::prelude::*;
 
-/// Normals, and how they were found.
-#[wasm_bindgen]
-#[derive(Debug)]
-pub struct Estimation {
-    normals: Option<Vec<f32>>,
-    report: Report,
-    peak_bytes: u64,
-}
-
 /// Estimates the normals of `x0 y0 z0 x1 ...`, 32-bit numbers or, if `double`, 64-bit ones. Consumes the buffer.
-#[wasm_bindgen]
+///
+/// Answers with an object of `normals`, a buffer of three 32-bit numbers for each point, and the `report`.
+#[wasm_bindgen(unchecked_return_type = "{ normals: Buffer, report: object }")]
 pub fn estimate(
     positions: Buffer,
     double: bool,
     #[wasm_bindgen(unchecked_param_type = "object")] options: &JsValue,
     #[wasm_bindgen(unchecked_param_type = "(phase: string, fraction: number) => void")] tell: &Function,
-) -> Result<Estimation, JsValue> {
+) -> Result<Object, JsValue> {
     call(tell, |progress| {
         let options = options::parse(options)?;
         let Estimate { normals, report, .. } = if double {
@@ -34,39 +26,30 @@ pub fn estimate(
         } else {
             crate::estimate::estimate(&Points::from_f32(positions.numbers("positions", 3)?)?, &options, progress)?
         };
-        Ok(Estimation { normals: Some(normals), report, peak_bytes: memory::peak() })
+        let estimation = Object::new();
+        set(&estimation, "normals", Buffer::from(normals));
+        set(&estimation, "report", describe(&report));
+        Ok(estimation)
     })
 }
 
-#[wasm_bindgen]
-impl Estimation {
-    /// Gives the normals away, 32-bit numbers, three for each point; once.
-    #[wasm_bindgen(js_name = takeNormals)]
-    pub fn take_normals(&mut self) -> Result<Buffer, JsValue> {
-        self.normals.take().map(Buffer::from).ok_or_else(|| Error::Input("the normals were taken before".into()).into())
+fn describe(report: &Report) -> Object {
+    let object = Object::new();
+    set(&object, "points", report.points as f64);
+    set(&object, "unresolved", report.unresolved as f64);
+    set(&object, "cells", report.cells as f64);
+    set(&object, "nodes", report.nodes as f64);
+    set(&object, "grid", array(&report.grid));
+    set(&object, "cellSize", report.cell_size);
+    set(&object, "scale", report.scale);
+    set(&object, "nodesUsed", array(&report.nodes_used));
+    let milliseconds = Object::new();
+    for &(phase, time) in &report.milliseconds {
+        set(&milliseconds, phase, time);
     }
-
-    /// What was done, as a plain object.
-    #[wasm_bindgen(getter, unchecked_return_type = "object")]
-    pub fn report(&self) -> Object {
-        let report = &self.report;
-        let object = Object::new();
-        set(&object, "points", report.points as f64);
-        set(&object, "unresolved", report.unresolved as f64);
-        set(&object, "cells", report.cells as f64);
-        set(&object, "nodes", report.nodes as f64);
-        set(&object, "grid", array(&report.grid));
-        set(&object, "cellSize", report.cell_size);
-        set(&object, "scale", report.scale);
-        set(&object, "nodesUsed", array(&report.nodes_used));
-        let milliseconds = Object::new();
-        for &(phase, time) in &report.milliseconds {
-            set(&milliseconds, phase, time);
-        }
-        set(&object, "milliseconds", milliseconds);
-        set(&object, "peakBytes", self.peak_bytes as f64);
-        object
-    }
+    set(&object, "milliseconds", milliseconds);
+    set(&object, "peakBytes", memory::peak() as f64);
+    object
 }
 
 fn array(counts: &[u64]) -> Array {
