@@ -96,7 +96,7 @@ function reliefRange() {
 }
 
 /** Seeded numbers in 0 to 1 (Mulberry32, Tommy Ettinger, public domain). */
-function mulberry(state) {
+export function mulberry(state) {
   return () => {
     state = (state + 0x6d2b79f5) | 0;
     let mixed = Math.imul(state ^ (state >>> 15), 1 | state);

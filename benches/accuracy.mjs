@@ -1,0 +1,68 @@
+// npm run accuracy [-- --meshes FOLDER] [--out FOLDER] [--rows NAME,...]: errors of normals on shapes whose normals are
+// known, and on points sampled on the meshes of a folder, as docs/accuracy.md. With --rows only those of these shapes,
+// variants or both ("cube", "noise0.6", "cube-clean"): printed, and not written.
+
+import { existsSync, mkdirSync, writeFileSync } from 'node:fs';
+import { availableParallelism, cpus } from 'node:os';
+import { join, resolve } from 'node:path';
+import { parseArgs } from 'node:util';
+import { build } from '../scripts/build.mjs';
+import { Failure, main, root, tell } from '../scripts/run.mjs';
+import { setup } from '../scripts/setup.mjs';
+import { FULL, chosenRows, measureAll, plannedRows } from './accuracy/measure.mjs';
+import { readMeshes } from './accuracy/meshes.mjs';
+import { details, report } from './accuracy/report.mjs';
+
+const OPTIONS = { meshes: { type: 'string' }, out: { type: 'string' }, rows: { type: 'string' } };
+
+/** npm changes into the project's folder; names are meant from where the user stands. */
+const fromUser = (path) => path && resolve(process.env.INIT_CWD ?? '.', path);
+
+const machine = () => ({
+  model: cpus()[0].model.trim(),
+  cores: cpus().length,
+  node: process.versions.node,
+  date: new Date().toLocaleDateString('en-GB', { day: 'numeric', month: 'long', year: 'numeric' }),
+});
+
+function choose(rows, names) {
+  try {
+    return chosenRows(rows, names);
+  } catch ({ message }) {
+    throw new Failure(message);
+  }
+}
+
+await main(async () => {
+  const { values } = parseArgs({ options: OPTIONS });
+  const folder = fromUser(values.meshes);
+  if (folder && !existsSync(folder)) throw new Failure(`no folder ${values.meshes}`);
+  setup();
+  build();
+  const { createEstimator } = await import('../dist/node.js');
+  const start = performance.now();
+  const { meshes, skipped } = readMeshes(folder);
+  const planned = plannedRows(FULL, meshes);
+  const chosen = values.rows === undefined ? planned : choose(planned, values.rows.split(','));
+  const threads = availableParallelism();
+  const estimator = await createEstimator({ threads });
+  try {
+    const rows = await measureAll(estimator, chosen, {
+      sampled: FULL.sampled,
+      tell: (what) => tell(`accuracy: ${what}`),
+    });
+    if (values.rows !== undefined) {
+      const whole = rows.map((row) => ({ ...row, name: `${row.name}-${row.variant}` }));
+      console.log(details(whole).join('\n\n'));
+      return;
+    }
+    const out = fromUser(values.out) ?? join(root, 'docs');
+    mkdirSync(out, { recursive: true });
+    const minutes = (performance.now() - start) / 60_000;
+    const facts = { machine: machine(), threads, minutes, sampled: FULL.sampled, hasFolder: !!folder, skipped };
+    writeFileSync(join(out, 'accuracy.md'), report(rows, facts));
+    tell(`accuracy: written to ${values.out ?? 'docs'}/accuracy.md`);
+  } finally {
+    estimator.dispose();
+  }
+});
