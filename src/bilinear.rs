@@ -1,7 +1,7 @@
 //! The normals of the points, interpolated between the nodes round them.
 
 use crate::error::Error;
-use crate::grid::{Grid, Placed, STEPS, Surroundings};
+use crate::grid::{Grid, Placed, Places, STEPS, Surroundings};
 use crate::lattice::{cube_centre, octant_in_brick};
 use crate::nodes::Node;
 use crate::normals::Normals;
@@ -57,19 +57,19 @@ struct GoodNode {
 }
 
 /// The good nodes of the 6x6x6 cubes in and round a brick, in the order of [`Surroundings`].
-struct GoodNodes([GoodNode; Surroundings::CUBES]);
+struct GoodNodes([GoodNode; Places::COUNT]);
 
 impl GoodNodes {
-    const NONE: Self = Self([GoodNode { position: Vec3::ZERO, normal: Vec3::ZERO }; Surroundings::CUBES]);
+    const NONE: Self = Self([GoodNode { position: Vec3::ZERO, normal: Vec3::ZERO }; Places::COUNT]);
 
     fn fill(&mut self, surroundings: &Surroundings, nodes: &[Node]) {
-        for (place, good) in self.0.iter_mut().enumerate() {
+        for good in &mut self.0 {
             good.normal = Vec3::ZERO;
-            if let Some(cube) = surroundings.cube(place)
-                && nodes[cube].is_good()
-            {
-                let Node { normal, .. } = nodes[cube];
-                *good = GoodNode { position: Surroundings::centre(place) + nodes[cube].position(), normal };
+        }
+        for place in surroundings.occupied.iter() {
+            let node = nodes[surroundings.cube(place)];
+            if node.is_good() {
+                self.0[place] = GoodNode { position: Places::centre(place) + node.position(), normal: node.normal };
             }
         }
     }
@@ -94,7 +94,7 @@ struct Cube<'a> {
 impl<'a> Cube<'a> {
     #[inline(always)]
     fn new(nodes: &'a GoodNodes, own: Node, bit: u32) -> Self {
-        let place = Surroundings::place(bit);
+        let place = Places::of_cube(bit);
         let centre = cube_centre(bit);
         let (axes, strides) = match own.normal.abs().max_position() {
             0 => ([0, 1, 2], [1, 6, 36]),
@@ -182,7 +182,7 @@ impl<'a> Cube<'a> {
     fn nearest(&self, point: Vec3) -> Vec3 {
         let mut nearest = (f32::INFINITY, self.own);
         for step in STEPS {
-            let node = &self.nodes.0[self.place.wrapping_add_signed(Surroundings::stride(step))];
+            let node = &self.nodes.0[self.place.wrapping_add_signed(Places::stride(step))];
             let distance = node.position.distance_squared(point);
             if node.normal != Vec3::ZERO && distance < nearest.0 {
                 nearest = (distance, node.normal);

@@ -7,7 +7,7 @@ use crate::parallel::{self, Filling, Scatter};
 use crate::pca::Moments;
 use crate::points::{CHUNK, Points, reserve};
 use crate::progress::Stage;
-use glam::{IVec3, UVec3, Vec3};
+use glam::{IVec3, UVec3, Vec3, Vec4};
 use std::mem::MaybeUninit;
 use std::ops::Range;
 
@@ -230,20 +230,20 @@ fn blocks(first_point: &[u32]) -> Vec<Range<usize>> {
 
 /// The cubes in and one deep round a brick: 6x6x6 places, x fastest, the brick's first cube at (1, 1, 1).
 pub(crate) struct Surroundings {
-    cubes: [u32; Self::CUBES],
+    /// Those that are occupied.
+    pub occupied: Places,
+    /// Their numbers.
+    cubes: [u32; Places::COUNT],
 }
 
 impl Surroundings {
-    pub const CUBES: usize = 6 * 6 * 6;
-    const EMPTY: u32 = u32::MAX;
-
     pub fn new() -> Self {
-        Self { cubes: [Self::EMPTY; Self::CUBES] }
+        Self { occupied: Places::NONE, cubes: [0; Places::COUNT] }
     }
 
     /// Looks up the 27 bricks around and in place of brick `brick`.
     pub fn look(&mut self, grid: &Grid, brick: usize) {
-        self.cubes.fill(Self::EMPTY);
+        self.occupied = Places::NONE;
         for step in STEPS {
             let number = if step == IVec3::ZERO {
                 Some(brick as u32)
@@ -252,23 +252,59 @@ impl Surroundings {
             };
             let Some(number) = number else { continue };
             let (mask, first) = (grid.masks[number as usize], grid.first_cube[number as usize]);
-            let shift = 4 * Self::stride(step);
+            let shift = 4 * Places::stride(step);
             for bit in set_bits(mask & facing(step)) {
                 let before = (mask & ((1 << bit) - 1)).count_ones();
-                self.cubes[Self::place(bit).wrapping_add_signed(shift)] = first + before;
+                let place = Places::of_cube(bit).wrapping_add_signed(shift);
+                self.occupied.insert(place);
+                self.cubes[place] = first + before;
             }
         }
     }
 
-    /// The number of the cube at a place, if it is occupied.
+    /// The number of the cube at an occupied place.
     #[inline]
-    pub fn cube(&self, place: usize) -> Option<usize> {
-        (self.cubes[place] != Self::EMPTY).then_some(self.cubes[place] as usize)
+    pub fn cube(&self, place: usize) -> usize {
+        self.cubes[place] as usize
+    }
+}
+
+/// A set of the 6x6x6 places in and round a brick. A place is `x + 6 y + 36 z`, a word holds those of one z.
+#[derive(Clone, Copy)]
+pub(crate) struct Places([u64; 6]);
+
+impl Places {
+    pub const COUNT: usize = 6 * 6 * 6;
+    pub const NONE: Self = Self([0; 6]);
+
+    #[inline]
+    pub fn insert(&mut self, place: usize) {
+        self.0[place / 36] |= 1 << (place % 36);
+    }
+
+    /// All of them, lowest first.
+    pub fn iter(&self) -> impl Iterator<Item = usize> {
+        self.0.iter().enumerate().flat_map(|(z, &word)| set_bits(word).map(move |bit| 36 * z + bit as usize))
+    }
+
+    /// Those among the 27 round the cube with bit `bit` of the brick, and how many cubes away each lies, in three of four
+    /// lanes.
+    #[inline(always)]
+    pub fn near(&self, bit: u32) -> impl Iterator<Item = (usize, Vec4)> {
+        const ROWS: u64 = 0b111_000_111_000_111;
+        // The first of the 27, which is one lower along each axis, among those of its z.
+        let (corner, z) = ((bit & 3) + 6 * (bit >> 2 & 3), bit as usize >> 4);
+        let near = |dz: usize| (self.0[z + dz] >> corner & ROWS) << (16 * dz);
+        let first = 36 * z + corner as usize;
+        set_bits(near(0) | near(1) | near(2)).map(move |bit| {
+            // Places of one z are 16 bits apart here from those of the next.
+            (first + bit as usize + 20 * (bit as usize / 16), NEAR[bit as usize % 64])
+        })
     }
 
     /// The place of the cube with bit `bit` of the brick.
     #[inline]
-    pub fn place(bit: u32) -> usize {
+    pub fn of_cube(bit: u32) -> usize {
         (43 + (bit & 3) + 6 * (bit >> 2 & 3) + 36 * (bit >> 4)) as usize
     }
 
@@ -285,6 +321,18 @@ impl Surroundings {
         UVec3::new(place % 6, place / 6 % 6, place / 36).as_vec3() - 0.5
     }
 }
+
+/// The steps behind the bits of [`Places::near`].
+const NEAR: [Vec4; 64] = {
+    let mut steps = [Vec4::ZERO; 64];
+    let mut i = 0;
+    while i < 27 {
+        let IVec3 { x, y, z } = STEPS[i];
+        steps[(x + 6 * y + 16 * z + 23) as usize] = Vec4::new(x as f32, y as f32, z as f32, 0.0);
+        i += 1;
+    }
+    steps
+};
 
 /// The 27 steps from a cube to itself and its neighbours, x fastest.
 pub(crate) const STEPS: [IVec3; 27] = {

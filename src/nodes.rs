@@ -2,7 +2,7 @@
 
 use crate::bricks::set_bits;
 use crate::error::Error;
-use crate::grid::{Grid, STEPS, Surroundings};
+use crate::grid::{Grid, Surroundings};
 use crate::parallel::Filling;
 use crate::pca::Moments;
 use crate::progress::Stage;
@@ -51,11 +51,8 @@ pub(crate) fn nodes(grid: &Grid, moments: &[Moments], stage: &Stage) -> Result<V
             surroundings.look(grid, brick);
             for (cube, bit) in (grid.first_cube[brick] as usize..).zip(set_bits(grid.masks[brick])) {
                 let mut sum = Moments::zeroed();
-                let place = Surroundings::place(bit);
-                for step in STEPS {
-                    if let Some(cube) = surroundings.cube(place.wrapping_add_signed(Surroundings::stride(step))) {
-                        sum.add_shifted(&moments[cube], step);
-                    }
+                for (place, step) in surroundings.occupied.near(bit) {
+                    sum.add_shifted(&moments[surroundings.cube(place)], step);
                 }
                 // SAFETY: a cube belongs to one brick, and a brick to one block.
                 unsafe { nodes.write(cube, Node::of(&sum)) };
