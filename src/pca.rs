@@ -55,18 +55,18 @@ impl Moments {
     /// points, and for points on one line.
     ///
     /// The sign of the normal is arbitrary but the same for the same sums.
+    #[inline(always)]
     pub fn plane(&self) -> Option<(Vec3, Vec3)> {
         let count = self.sums.w;
         if count < 3.0 {
             return None;
         }
-        let n = f64::from(count);
-        let mean = self.sums.xyz().as_dvec3() / n;
-        let diagonal = self.squares.xyz().as_dvec3() / n - mean * mean;
-        let products = DVec3::new(mean.y * mean.z, mean.x * mean.z, mean.x * mean.y);
-        let off = self.products.xyz().as_dvec3() / n - products;
-        let normal = Symmetric { diagonal, off }.normal()?;
-        Some((mean.as_vec3(), normal.as_vec3()))
+        // Times the square of the count: in double precision these products are exact, and so is a plane along the axes.
+        let (n, s) = (f64::from(count), self.sums.xyz().as_dvec3());
+        let diagonal = n * self.squares.xyz().as_dvec3() - s * s;
+        let off = n * self.products.xyz().as_dvec3() - DVec3::new(s.y * s.z, s.x * s.z, s.x * s.y);
+        let normal = Symmetric { diagonal, off }.normal(n * n)?;
+        Some(((s / n).as_vec3(), normal.as_vec3()))
     }
 }
 
@@ -79,30 +79,31 @@ struct Symmetric {
 }
 
 impl Symmetric {
-    /// The unit eigenvector of the smallest eigenvalue, unless the second eigenvalue vanishes too.
+    /// The unit eigenvector of the smallest eigenvalue, unless the second eigenvalue vanishes too, also against
+    /// `unit`, a square edge.
     ///
-    /// The rows of `A - lambda3` span the plane across the wanted vector, so it is the cross product of two of them:
-    /// the longest of the three products, which is never short while the second eigenvalue stands apart.
-    fn normal(&self) -> Option<DVec3> {
+    /// The adjugate of `A - lambda3` has the wanted vector in each of its columns, times what its own component there
+    /// says: the column with the largest diagonal is never short while the second eigenvalue stands apart.
+    #[inline(always)]
+    fn normal(&self, unit: f64) -> Option<DVec3> {
         let trace = self.diagonal.element_sum();
         let smallest = self.smallest_eigenvalue();
         // lambda1 + lambda2 and lambda1 * lambda2, and from them a lower bound of lambda2 = product / lambda1.
         let sum = trace - smallest;
         let product = (self.minors() - smallest * sum).max(0.0);
-        if product <= LINE * sum * sum.max(1.0) {
+        if product <= LINE * sum * sum.max(unit) {
             return None;
         }
         let (d, o) = (self.diagonal - smallest, self.off);
-        let rows = [DVec3::new(d.x, o.z, o.y), DVec3::new(o.z, d.y, o.x), DVec3::new(o.y, o.x, d.z)];
-        let crosses = [rows[0].cross(rows[1]), rows[1].cross(rows[2]), rows[2].cross(rows[0])];
-        let mut longest = crosses[0];
-        for cross in &crosses[1..] {
-            if cross.length_squared() > longest.length_squared() {
-                longest = *cross;
-            }
-        }
+        let x = d.y * d.z - o.x * o.x;
+        let y = d.x * d.z - o.y * o.y;
+        let z = d.x * d.y - o.z * o.z;
+        let (yz, xz, xy) = (o.y * o.z - d.x * o.x, o.x * o.z - d.y * o.y, o.x * o.y - d.z * o.z);
+        // By index, because nothing foretells a branch.
+        let columns = [DVec3::new(x, xy, xz), DVec3::new(xy, y, yz), DVec3::new(xz, yz, z)];
+        let longest = if (z > x) & (z > y) { 2 } else { usize::from(y > x) };
         // Isotropic: every direction is an eigenvector, and A - lambda3 has no rows left.
-        Some(longest.try_normalize().unwrap_or(DVec3::Z))
+        Some(columns[longest].try_normalize().unwrap_or(DVec3::Z))
     }
 
     /// The sum of the principal 2x2 minors.
@@ -116,23 +117,27 @@ impl Symmetric {
         d.x * (d.y * d.z - o.x * o.x) - o.z * (o.z * d.z - o.x * o.y) + o.y * (o.z * o.x - d.y * o.y)
     }
 
-    /// The smallest root of the characteristic polynomial, by Newton's method from zero.
+    /// The smallest root of the characteristic polynomial, by Halley's method from zero.
     ///
-    /// Left of its smallest root a cubic with three real roots is monotone and bends one way, so the steps rise
-    /// towards the root and never pass it. Planar neighbourhoods take two or three; the bound serves nearly isotropic
-    /// ones, whose normal means little. No trigonometry: the same bits on every platform.
+    /// Left of the smallest root of a polynomial with real roots only, the steps rise towards the root and never pass it.
+    /// Each cubes the error: planar neighbourhoods take two. The bound serves nearly isotropic ones, whose normal means
+    /// little. No trigonometry: the same bits on every platform.
+    #[inline(always)]
     fn smallest_eigenvalue(&self) -> f64 {
         let (trace, minors, determinant) = (self.diagonal.element_sum(), self.minors(), self.determinant());
+        // A step this small against lambda2 leaves an error far below rounding.
+        let last = 1e-5 * minors / trace;
         let mut root = 0.0;
         for _ in 0..24 {
             let value = ((trace - root) * root - minors) * root + determinant;
             let slope = (2.0 * trace - 3.0 * root) * root - minors;
+            let bend = trace - 3.0 * root;
             if value <= 0.0 || slope >= 0.0 {
                 break;
             }
-            let step = value / -slope;
+            let step = value * slope / (value * bend - slope * slope);
             root += step;
-            if step <= 1e-13 * trace {
+            if step <= last {
                 break;
             }
         }
