@@ -1,8 +1,9 @@
 //! The normals of the points, interpolated between the nodes round them.
 
+use crate::bricks::set_bits;
 use crate::error::Error;
-use crate::grid::{Grid, Placed, Places, STEPS, Surroundings};
-use crate::lattice::{cube_centre, octant_in_brick};
+use crate::grid::{Grid, MIDDLE, NEAR_STRIDES, Placed, Places, Surroundings};
+use crate::lattice::cube_centre;
 use crate::nodes::Node;
 use crate::normals::Normals;
 use crate::progress::Stage;
@@ -23,21 +24,16 @@ pub(crate) fn interpolate(
     stage.run(grid.blocks.len(), &|block| {
         let mut surroundings = Surroundings::new();
         let mut good = GoodNodes::NONE;
-        let (mut used, mut resolved) = ([0; 5], 0);
+        let mut tally = Tally::default();
         for brick in grid.blocks[block].clone() {
             surroundings.look(grid, brick);
             good.fill(&surroundings, nodes);
             for (cube, (points, bit)) in (grid.first_cube[brick] as usize..).zip(grid.cubes_of(brick)) {
-                Cube::new(&good, nodes[cube], bit).interpolate(points, |normal, count, point| {
-                    used[count] += 1;
-                    resolved += u64::from(normal != Vec3::ZERO);
-                    // SAFETY: every point of the input stands in the grid once at the most.
-                    unsafe { normals.write(point, normal) };
-                });
+                Cube::new(&good, &nodes[cube], bit).interpolate(points, &normals, &mut tally);
             }
         }
-        all_used.iter().zip(used).for_each(|(all, used)| _ = all.fetch_add(used, Relaxed));
-        normals.add_resolved(resolved);
+        all_used.iter().zip(tally.used).for_each(|(all, used)| _ = all.fetch_add(used, Relaxed));
+        normals.add_resolved(tally.resolved);
     })?;
     // SAFETY: the blocks hold every point of the grid.
     let (normals, resolved) = unsafe { normals.complete() };
@@ -47,150 +43,246 @@ pub(crate) fn interpolate(
     Ok((normals, resolved, nodes_used))
 }
 
-/// A node that takes part in the interpolation.
+/// Counts of points.
+#[derive(Default)]
+struct Tally {
+    /// Interpolated from 0 to 4 nodes.
+    used: [u64; 5],
+    resolved: u64,
+}
+
+/// A node that takes part in the interpolation. The fourth lanes are zero.
 #[derive(Clone, Copy)]
 struct GoodNode {
     /// In the brick, in edges.
-    position: Vec3,
-    /// Zero where there is no such node.
-    normal: Vec3,
+    position: Vec4,
+    normal: Vec4,
 }
 
-/// The good nodes of the 6x6x6 cubes in and round a brick, in the order of [`Surroundings`].
-struct GoodNodes([GoodNode; Places::COUNT]);
+/// The good nodes of the 6x6x6 cubes in and round a brick.
+struct GoodNodes {
+    there: Places,
+    /// By place; what stands where there is none is of another brick.
+    nodes: [GoodNode; Places::COUNT],
+}
 
 impl GoodNodes {
-    const NONE: Self = Self([GoodNode { position: Vec3::ZERO, normal: Vec3::ZERO }; Places::COUNT]);
+    const NONE: Self =
+        Self { there: Places::NONE, nodes: [GoodNode { position: Vec4::ZERO, normal: Vec4::ZERO }; Places::COUNT] };
 
     fn fill(&mut self, surroundings: &Surroundings, nodes: &[Node]) {
-        for good in &mut self.0 {
-            good.normal = Vec3::ZERO;
-        }
+        self.there = Places::NONE;
         for place in surroundings.occupied.iter() {
             let node = nodes[surroundings.cube(place)];
             if node.is_good() {
-                self.0[place] = GoodNode { position: Places::centre(place) + node.position(), normal: node.normal };
+                self.there.insert(place);
+                let position = Places::centre(place) + node.position();
+                self.nodes[place] = GoodNode { position: position.extend(0.0), normal: node.normal.extend(0.0) };
             }
         }
     }
 }
 
-/// All that the points of one cube share. "u" and "v" are the two axes after the axis of projection, cyclically.
-struct Cube<'a> {
-    nodes: &'a GoodNodes,
-    /// The place of the cube among the 6x6x6.
-    place: usize,
-    /// The plane of the cube, whether or not the cube holds its node; zero if it has none.
-    own: Vec3,
-    /// Where the own normal is largest, then u and v.
+/// One of the three ways in which the axes of a cube can be turned.
+struct Turn {
+    /// The axis of projection, then the two after it, cyclically: "u" and "v".
     axes: [usize; 3],
     /// What lies between two places next to each other along these axes.
     strides: [usize; 3],
-    /// For the points below and above the centre along the axis, the place of the node of each of the 9 columns, if it
-    /// has one.
-    columns: [[u8; 9]; 2],
+    /// The same for the bits of [`Places::near`].
+    near: [u32; 3],
+    /// The bits of the 9 cubes in the middle along the axis of projection.
+    middle: u64,
+}
+
+const TURNS: [Turn; 3] = {
+    const fn turn(axes: [usize; 3]) -> Turn {
+        const STRIDES: [usize; 3] = [1, 6, 36];
+        let [a, u, v] = axes;
+        Turn {
+            axes,
+            strides: [STRIDES[a], STRIDES[u], STRIDES[v]],
+            near: [NEAR_STRIDES[a], NEAR_STRIDES[u], NEAR_STRIDES[v]],
+            middle: MIDDLE[a],
+        }
+    }
+    [turn([0, 1, 2]), turn([1, 2, 0]), turn([2, 0, 1])]
+};
+
+/// For the points below or above the centre of a cube along the axis of projection, the nodes of the 9 columns of cubes
+/// that lie along it, one bit each, that of the cube in the column's middle.
+#[derive(Clone, Copy)]
+struct Columns {
+    /// Those that have a node.
+    there: u64,
+    /// Those whose node is in the cube below or above, not in the middle.
+    outside: u64,
+}
+
+/// All that the points of one cube share.
+struct Cube<'a> {
+    nodes: &'a GoodNodes,
+    bit: u32,
+    centre: Vec3,
+    /// The normal of the cube's plane, whether or not the cube holds its node; zero if it has none.
+    own: Vec4,
+    /// So that the own normal is largest along the first axis.
+    turn: &'static Turn,
+    /// For the points below and above the centre along the axis.
+    columns: [Columns; 2],
 }
 
 impl<'a> Cube<'a> {
     #[inline(always)]
-    fn new(nodes: &'a GoodNodes, own: Node, bit: u32) -> Self {
-        let place = Places::of_cube(bit);
+    fn new(nodes: &'a GoodNodes, own: &Node, bit: u32) -> Self {
         let centre = cube_centre(bit);
-        let (axes, strides) = match own.normal.abs().max_position() {
-            0 => ([0, 1, 2], [1, 6, 36]),
-            1 => ([1, 2, 0], [6, 36, 1]),
-            _ => ([2, 0, 1], [36, 1, 6]),
+        let size = own.normal.abs();
+        // By index, because nothing foretells a branch.
+        let turn = if (size.z > size.x) & (size.z > size.y) { 2 } else { usize::from(size.y > size.x) };
+        let mut cube = Self {
+            nodes,
+            bit,
+            centre,
+            own: own.normal.extend(0.0),
+            turn: &TURNS[turn],
+            columns: [Columns { there: 0, outside: 0 }; 2],
         };
-        let mut cube = Self { nodes, place, own: own.normal, axes, strides, columns: [[0; 9]; 2] };
-        cube.fill_columns(own.normal.dot(centre) + own.offset);
+        // Without an own plane there is no axis and no common side: the points take the nearest node.
+        if own.has_plane() {
+            cube.fill_columns(own.normal.dot(centre) + own.offset);
+        }
         cube
     }
 
     /// Takes from the two cubes of each column the node that lies nearer to the own plane, `own . x = offset`.
     #[inline(always)]
     fn fill_columns(&mut self, offset: f32) {
-        let [along, along_u, along_v] = self.strides;
-        // The first of the 27 places.
-        let corner = self.place - along - along_u - along_v;
-        for number in 0..9 {
-            let below = corner + number % 3 * along_u + number / 3 * along_v;
-            let (middle, above) = (below + along, below + 2 * along);
-            let distance = self.distance(middle, offset);
-            self.columns[0][number] = if self.distance(below, offset) < distance { below } else { middle } as u8;
-            self.columns[1][number] = if self.distance(above, offset) < distance { above } else { middle } as u8;
+        let near = self.nodes.there.near(self.bit);
+        let Turn { strides: [along, ..], near: [step, ..], middle, .. } = *self.turn;
+        let inside = near & middle;
+        let outsides = [(near << step) & middle, (near >> step) & middle];
+        for (columns, (outside, along)) in
+            self.columns.iter_mut().zip(outsides.into_iter().zip([along.wrapping_neg(), along]))
+        {
+            columns.there = inside | outside;
+            columns.outside = outside & !inside;
+            for column in set_bits(inside & outside) {
+                let place = Places::of_near(self.bit, column);
+                let distance = |place: usize| (self.own.dot(self.nodes.nodes[place].position) - offset).abs();
+                // Of planes through the same points, which are the same, rounding must not choose: that on the side of
+                // the points does.
+                let is_nearer = distance(place.wrapping_add(along)) < distance(place) + 1e-5;
+                columns.outside |= u64::from(is_nearer) << column;
+            }
         }
     }
 
-    /// How far the node at a place lies from the own plane; infinitely far if there is none.
+    /// Writes the normals of the points of the cube. Those of an octant, which lie one after the other, share its nodes;
+    /// four at a time are computed at once.
     #[inline(always)]
-    fn distance(&self, place: usize, offset: f32) -> f32 {
-        let node = &self.nodes.0[place];
-        if node.normal == Vec3::ZERO { f32::INFINITY } else { (self.own.dot(node.position) - offset).abs() }
-    }
-
-    /// Calls `resolve(normal, nodes used, number of the point)` for each point of the cube. The points of an octant, which
-    /// lie one after the other, share its nodes; four at a time are computed at once.
-    #[inline(always)]
-    fn interpolate(&self, points: &[Placed], mut resolve: impl FnMut(Vec3, usize, u32)) {
+    fn interpolate(&self, points: &[Placed], normals: &Normals, tally: &mut Tally) {
+        let octant_of = |placed: &Placed| placed.local.cmpge(self.centre).bitmask();
         let mut rest = points;
         while let Some(first) = rest.first() {
-            let number = octant_in_brick(first.local);
-            let length = rest.iter().take_while(|placed| octant_in_brick(placed.local) == number).count();
+            let number = octant_of(first);
+            let length = 1 + rest[1..].iter().take_while(|placed| octant_of(placed) == number).count();
             let (points, others) = rest.split_at(length);
             rest = others;
-            let octant = self.octant(number);
-            if octant.used == 0 {
-                points.iter().for_each(|placed| resolve(self.nearest(placed.local), 0, placed.point));
-                continue;
-            }
-            let [_, u, v] = self.axes;
-            for four in points.chunks(4) {
-                let [x, y, z] = octant.normals(along(four, u), along(four, v), self.own).map(|lanes| lanes.to_array());
-                for (i, placed) in four.iter().enumerate() {
-                    resolve(Vec3::new(x[i], y[i], z[i]), octant.used, placed.point);
+            let Some(octant) = self.octant(number) else {
+                tally.used[0] += points.len() as u64;
+                for placed in points {
+                    let normal = self.nearest(placed.local);
+                    tally.resolved += u64::from(normal != Vec3::ZERO);
+                    // SAFETY: every point of the input stands in the grid once at the most.
+                    unsafe { normals.write(placed.point, normal) };
                 }
+                continue;
+            };
+            tally.used[octant.used] += points.len() as u64;
+            tally.resolved += points.len() as u64;
+            let [_, u, v] = self.turn.axes;
+            for four in points.chunks(4) {
+                let lanes = octant.normals(along(four, u), along(four, v), self.own);
+                // SAFETY: as above.
+                unsafe { normals.write_lanes(four.iter().map(|placed| placed.point), lanes) };
             }
         }
     }
 
-    /// The octant with a number as [`octant_in_brick`] gives it.
+    /// The octant with a number whose bits 0, 1 and 2 tell whether it is not below the cube's centre along x, y and z;
+    /// `None` if there is no node in its 2x2x2 cubes.
     #[inline(always)]
-    fn octant(&self, number: u32) -> Octant {
-        if self.own == Vec3::ZERO {
-            // Without an own plane there is no axis and no common side: the points take the nearest node.
-            return Octant::new(None, None, None, None);
+    fn octant(&self, number: u32) -> Option<Octant> {
+        let Turn { axes, strides, near, .. } = self.turn;
+        let is_above = axes.map(|axis| number >> axis & 1 == 1);
+        let columns = &self.columns[usize::from(is_above[0])];
+        // To the next place and the next bit on the side of the octant.
+        let side = |axis: usize| {
+            if is_above[axis] {
+                (strides[axis], near[axis])
+            } else {
+                (strides[axis].wrapping_neg(), near[axis].wrapping_neg())
+            }
+        };
+        let ((along, _), (u, near_u), (v, near_v)) = (side(0), side(1), side(2));
+        let place = Places::of_cube(self.bit);
+        let corners = [(0, 0), (u, near_u), (v, near_v), (u.wrapping_add(v), near_u.wrapping_add(near_v))];
+        let mut there = 0;
+        let places: [usize; 4] = std::array::from_fn(|i| {
+            let (stride, near) = corners[i];
+            let column = Places::NEAR_CENTRE.wrapping_add(near) % 64;
+            there |= (columns.there >> column & 1) << i;
+            let outside = (columns.outside >> column & 1) as usize;
+            place.wrapping_add(stride).wrapping_add(along * outside)
+        });
+        if there == 0 {
+            return None;
         }
-        let is_above = self.axes.map(|axis| (number >> axis & 1) as usize);
-        let columns = &self.columns[is_above[0]];
-        let (far, row) = (3 + 2 * is_above[1], 1 + 6 * is_above[2]);
-        let seen = |column: usize| self.see(columns[column]);
-        Octant::new(seen(4), seen(far), seen(row), seen(row + far - 4))
+        let [a, b, c, d] = STANDINS[there as usize].map(|i| self.see(places[usize::from(i)]));
+        Some(Octant { pairs: [Pair::new(a, b), Pair::new(c, d)], used: there.count_ones() as usize })
     }
 
-    /// The node at a place, if there is one.
+    /// The node at a place.
     #[inline(always)]
-    fn see(&self, place: u8) -> Option<Seen> {
-        let GoodNode { position, normal } = self.nodes.0[usize::from(place)];
+    fn see(&self, place: usize) -> Seen {
+        let GoodNode { position, normal } = &self.nodes.nodes[place];
         let side = normal.dot(self.own);
-        let normal = if side < 0.0 { -normal } else { normal };
-        let position = position.to_array();
-        let [_, u, v] = self.axes;
-        (normal != Vec3::ZERO).then(|| Seen { u: position[u], normal_and_v: normal.extend(position[v]) })
+        let normal = if side < 0.0 { -*normal } else { *normal };
+        let position: &[f32; 4] = position.as_ref();
+        let [_, u, v] = self.turn.axes;
+        Seen { u: position[u], normal_and_v: normal.with_w(position[v]) }
     }
 
     /// The normal of the nearest node in the 27 cubes; without any, that of the own plane, which may be zero.
     fn nearest(&self, point: Vec3) -> Vec3 {
         let mut nearest = (f32::INFINITY, self.own);
-        for step in STEPS {
-            let node = &self.nodes.0[self.place.wrapping_add_signed(Places::stride(step))];
-            let distance = node.position.distance_squared(point);
-            if node.normal != Vec3::ZERO && distance < nearest.0 {
+        for near in set_bits(self.nodes.there.near(self.bit)) {
+            let node = &self.nodes.nodes[Places::of_near(self.bit, near)];
+            let distance = node.position.distance_squared(point.extend(0.0));
+            if distance < nearest.0 {
                 nearest = (distance, node.normal);
             }
         }
-        nearest.1
+        nearest.1.xyz()
     }
 }
+
+/// Which of four nodes (near and far along u, in the near row and in the far row) stands in for each of them, for each set
+/// of those that are there: itself, the other of its row, or one of the other row.
+const STANDINS: [[u8; 4]; 16] = {
+    let mut standins = [[0; 4]; 16];
+    let mut place = 4;
+    while place < 64 {
+        let (there, node) = (place / 4, place % 4);
+        let mut other = 0;
+        while there >> (node ^ other) & 1 == 0 {
+            other += 1;
+        }
+        standins[there][node] = (node ^ other) as u8;
+        place += 1;
+    }
+    standins
+};
 
 /// One coordinate of up to four points; where there are fewer, the last stands in for the others.
 #[inline(always)]
@@ -219,16 +311,15 @@ struct Pair {
 }
 
 impl Pair {
-    /// A missing node is replaced by the other; of two that coincide along u, the mean counts.
+    /// Of two nodes that coincide along u, as those do that stand in for one another, the mean counts.
     #[inline(always)]
-    fn new(a: Option<Seen>, b: Option<Seen>) -> Option<Self> {
-        let (a, b) = (a.or(b)?, b.or(a)?);
+    fn new(a: Seen, b: Seen) -> Self {
         let (length, gain) = (b.u - a.u, b.normal_and_v - a.normal_and_v);
-        Some(if length == 0.0 {
+        if length == 0.0 {
             Self { u: a.u, scale: 0.0, first: a.normal_and_v + 0.5 * gain, gain: Vec4::ZERO }
         } else {
             Self { u: a.u, scale: 1.0 / length, first: a.normal_and_v, gain }
-        })
+        }
     }
 
     /// x, y and z of the normal, and v, between the two nodes, at four places (paper, Eq. 15 and 16).
@@ -249,24 +340,15 @@ impl Pair {
 /// What the points of one octant of a cube share: the four nodes of their 2x2x2 cubes.
 struct Octant {
     pairs: [Pair; 2],
+    /// How many of the four there are.
     used: usize,
 }
 
 impl Octant {
-    /// From the nodes at the near and far column along u, in the near row and in the far row.
-    #[inline(always)]
-    fn new(a: Option<Seen>, b: Option<Seen>, c: Option<Seen>, d: Option<Seen>) -> Self {
-        const NONE: Pair = Pair { u: 0.0, scale: 0.0, first: Vec4::ZERO, gain: Vec4::ZERO };
-        let used = [a.is_some(), b.is_some(), c.is_some(), d.is_some()].iter().filter(|is_there| **is_there).count();
-        let (near, far) = (Pair::new(a, b), Pair::new(c, d));
-        let pairs = [near.or(far).unwrap_or(NONE), far.or(near).unwrap_or(NONE)];
-        Self { pairs, used }
-    }
-
     /// x, y and z of the interpolated unit normals at four places (paper, Eq. 15 to 17); the own normal where the nodes
     /// cancel each other.
     #[inline(always)]
-    fn normals(&self, u: Vec4, v: Vec4, own: Vec3) -> [Vec4; 3] {
+    fn normals(&self, u: Vec4, v: Vec4, own: Vec4) -> [Vec4; 3] {
         let ([ax, ay, az, av], [bx, by, bz, bv]) = (self.pairs[0].at(u), self.pairs[1].at(u));
         let length = bv - av;
         let weight = clamp((v - av) / length);
@@ -276,9 +358,9 @@ impl Octant {
         let is_long = square.cmpgt(Vec4::splat(1e-12));
         let scale = Vec4::ONE / square.sqrt();
         [
-            Vec4::select(is_long, x * scale, Vec4::splat(own.x)),
-            Vec4::select(is_long, y * scale, Vec4::splat(own.y)),
-            Vec4::select(is_long, z * scale, Vec4::splat(own.z)),
+            Vec4::select(is_long, x * scale, own.xxxx()),
+            Vec4::select(is_long, y * scale, own.yyyy()),
+            Vec4::select(is_long, z * scale, own.zzzz()),
         ]
     }
 }

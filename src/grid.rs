@@ -287,20 +287,23 @@ impl Places {
         self.0.iter().enumerate().flat_map(|(z, &word)| set_bits(word).map(move |bit| 36 * z + bit as usize))
     }
 
-    /// Those among the 27 round the cube with bit `bit` of the brick, and how many cubes away each lies, in three of four
-    /// lanes.
+    /// Those among the 27 round the cube with bit `bit` of the brick, as bits `x + 6 y + 16 z`, each 0 to 2.
     #[inline(always)]
-    pub fn near(&self, bit: u32) -> impl Iterator<Item = (usize, Vec4)> {
+    pub fn near(&self, bit: u32) -> u64 {
         const ROWS: u64 = 0b111_000_111_000_111;
-        // The first of the 27, which is one lower along each axis, among those of its z.
         let (corner, z) = ((bit & 3) + 6 * (bit >> 2 & 3), bit as usize >> 4);
         let near = |dz: usize| (self.0[z + dz] >> corner & ROWS) << (16 * dz);
-        let first = 36 * z + corner as usize;
-        set_bits(near(0) | near(1) | near(2)).map(move |bit| {
-            // Places of one z are 16 bits apart here from those of the next.
-            (first + bit as usize + 20 * (bit as usize / 16), NEAR[bit as usize % 64])
-        })
+        near(0) | near(1) | near(2)
     }
+
+    /// The place behind a bit of [`Places::near`].
+    #[inline(always)]
+    pub fn of_near(bit: u32, near: u32) -> usize {
+        Self::of_cube(bit) + (near + 20 * (near / 16)) as usize - 43
+    }
+
+    /// The bit of the cube itself in [`Places::near`].
+    pub const NEAR_CENTRE: u32 = 23;
 
     /// The place of the cube with bit `bit` of the brick.
     #[inline]
@@ -322,8 +325,8 @@ impl Places {
     }
 }
 
-/// The steps behind the bits of [`Places::near`].
-const NEAR: [Vec4; 64] = {
+/// How many cubes away that behind each bit of [`Places::near`] lies, in three of four lanes.
+pub(crate) const NEAR: [Vec4; 64] = {
     let mut steps = [Vec4::ZERO; 64];
     let mut i = 0;
     while i < 27 {
@@ -333,6 +336,12 @@ const NEAR: [Vec4; 64] = {
     }
     steps
 };
+
+/// What lies between two bits of [`Places::near`] next to each other along each axis.
+pub(crate) const NEAR_STRIDES: [u32; 3] = [1, 6, 16];
+
+/// The bits of [`Places::near`] in the middle along each axis.
+pub(crate) const MIDDLE: [u64; 3] = [0x2082_2082_2082, 0x01c0_01c0_01c0, 0x0000_71c7_0000];
 
 /// The 27 steps from a cube to itself and its neighbours, x fastest.
 pub(crate) const STEPS: [IVec3; 27] = {

@@ -2,7 +2,7 @@
 
 use crate::bricks::set_bits;
 use crate::error::Error;
-use crate::grid::{Grid, Surroundings};
+use crate::grid::{Grid, NEAR, Places, Surroundings};
 use crate::parallel::Filling;
 use crate::pca::Moments;
 use crate::progress::Stage;
@@ -51,8 +51,9 @@ pub(crate) fn nodes(grid: &Grid, moments: &[Moments], stage: &Stage) -> Result<V
             surroundings.look(grid, brick);
             for (cube, bit) in (grid.first_cube[brick] as usize..).zip(set_bits(grid.masks[brick])) {
                 let mut sum = Moments::zeroed();
-                for (place, step) in surroundings.occupied.near(bit) {
-                    sum.add_shifted(&moments[surroundings.cube(place)], step);
+                for near in set_bits(surroundings.occupied.near(bit)) {
+                    let cube = surroundings.cube(Places::of_near(bit, near));
+                    sum.add_shifted(&moments[cube], NEAR[near as usize % 64]);
                 }
                 // SAFETY: a cube belongs to one brick, and a brick to one block.
                 unsafe { nodes.write(cube, Node::of(&sum)) };

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::parallel::{self, Filling};
 use crate::points::CHUNK;
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use std::mem::MaybeUninit;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -33,7 +33,20 @@ impl Normals {
     #[inline(always)]
     pub unsafe fn write(&self, point: u32, normal: Vec3) {
         // SAFETY: by the caller's promise.
-        unsafe { self.normals.write(point as usize, face(normal)) }
+        unsafe { self.write_lanes([point].into_iter(), normal.to_array().map(Vec4::splat)) }
+    }
+
+    /// Takes the normals of up to four points, lane by lane, of either sign.
+    ///
+    /// # Safety
+    /// At most once for each point.
+    #[inline(always)]
+    pub unsafe fn write_lanes(&self, points: impl Iterator<Item = u32>, normals: [Vec4; 3]) {
+        let [x, y, z] = face(normals).map(|lanes| lanes.to_array());
+        for (i, point) in points.take(4).enumerate() {
+            // SAFETY: by the caller's promise.
+            unsafe { self.normals.write(point as usize, Vec3::new(x[i], y[i], z[i])) };
+        }
     }
 
     /// Counts points that were given a normal other than zero.
@@ -52,17 +65,14 @@ impl Normals {
     }
 }
 
-/// Chooses the sign: `x + 2y + 4z >= 0`, a plane that few man-made walls are parallel to.
-fn face(normal: Vec3) -> Vec3 {
-    let side = normal.dot(Vec3::new(1.0, 2.0, 4.0));
+/// Chooses the signs: `x + 2y + 4z >= 0`, a plane that few man-made walls are parallel to.
+#[inline(always)]
+fn face([x, y, z]: [Vec4; 3]) -> [Vec4; 3] {
+    let side = x + 2.0 * y + 4.0 * z;
     // On the plane itself the first component that is not zero decides.
-    let side = if side != 0.0 {
-        side
-    } else if normal.x != 0.0 {
-        normal.x
-    } else {
-        normal.y
-    };
+    let first = Vec4::select(x.cmpeq(Vec4::ZERO), y, x);
+    let side = Vec4::select(side.cmpeq(Vec4::ZERO), first, side);
+    let is_behind = side.cmplt(Vec4::ZERO);
     // Adding zero turns -0 into 0.
-    if side < 0.0 { Vec3::ZERO - normal } else { normal + Vec3::ZERO }
+    [x, y, z].map(|lanes| Vec4::select(is_behind, Vec4::ZERO - lanes, lanes + Vec4::ZERO))
 }
