@@ -7,7 +7,7 @@ use crate::lattice::cube_centre;
 use crate::nodes::Node;
 use crate::normals::Normals;
 use crate::progress::Stage;
-use glam::{Vec3, Vec4, Vec4Swizzles};
+use glam::{Mat4, Vec3, Vec4, Vec4Swizzles};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// Interpolates all points; those outside the grid get the zero vector. One pass over the sorted points.
@@ -87,24 +87,46 @@ impl GoodNodes {
 struct Turn {
     /// The axis of projection, then the two after it, cyclically: "u" and "v".
     axes: [usize; 3],
-    /// What lies between two places next to each other along these axes.
-    strides: [usize; 3],
+    /// What lies between two places next to each other along the axis of projection.
+    along: usize,
     /// The same for the bits of [`Places::near`].
-    near: [u32; 3],
+    along_near: u32,
     /// The bits of the 9 cubes in the middle along the axis of projection.
     middle: u64,
+    /// By octant: the columns of its four cubes in that layer, the near and the far one along u, in the near row and in the
+    /// far row.
+    corners: [[Corner; 4]; 8],
+}
+
+/// A column of cubes as an octant sees it.
+#[derive(Clone, Copy)]
+struct Corner {
+    /// The bit of [`Places::near`] of the cube in the middle of the column.
+    column: u32,
+    /// From the place of the own cube to that one's.
+    stride: isize,
 }
 
 const TURNS: [Turn; 3] = {
+    const STRIDES: [isize; 3] = [1, 6, 36];
     const fn turn(axes: [usize; 3]) -> Turn {
-        const STRIDES: [usize; 3] = [1, 6, 36];
         let [a, u, v] = axes;
-        Turn {
-            axes,
-            strides: [STRIDES[a], STRIDES[u], STRIDES[v]],
-            near: [NEAR_STRIDES[a], NEAR_STRIDES[u], NEAR_STRIDES[v]],
-            middle: MIDDLE[a],
+        let mut corners = [[Corner { column: 0, stride: 0 }; 4]; 8];
+        let mut i = 0;
+        while i < 32 {
+            let (octant, corner) = (i / 4, i % 4);
+            // One cube to the side of the octant, for the far ones.
+            let step_u = (corner & 1) as isize * if octant >> u & 1 == 1 { 1 } else { -1 };
+            let step_v = (corner >> 1) as isize * if octant >> v & 1 == 1 { 1 } else { -1 };
+            corners[octant][corner] = Corner {
+                column: (Places::NEAR_CENTRE as isize
+                    + step_u * NEAR_STRIDES[u] as isize
+                    + step_v * NEAR_STRIDES[v] as isize) as u32,
+                stride: step_u * STRIDES[u] + step_v * STRIDES[v],
+            };
+            i += 1;
         }
+        Turn { axes, along: STRIDES[a] as usize, along_near: NEAR_STRIDES[a], middle: MIDDLE[a], corners }
     }
     [turn([0, 1, 2]), turn([1, 2, 0]), turn([2, 0, 1])]
 };
@@ -158,9 +180,9 @@ impl<'a> Cube<'a> {
     #[inline(always)]
     fn fill_columns(&mut self, offset: f32) {
         let near = self.nodes.there.near(self.bit);
-        let Turn { strides: [along, ..], near: [step, ..], middle, .. } = *self.turn;
+        let Turn { along, along_near, middle, .. } = *self.turn;
         let inside = near & middle;
-        let outsides = [(near << step) & middle, (near >> step) & middle];
+        let outsides = [(near << along_near) & middle, (near >> along_near) & middle];
         for (columns, (outside, along)) in
             self.columns.iter_mut().zip(outsides.into_iter().zip([along.wrapping_neg(), along]))
         {
@@ -181,7 +203,8 @@ impl<'a> Cube<'a> {
     /// four at a time are computed at once.
     #[inline(always)]
     fn interpolate(&self, points: &[Placed], normals: &Normals, tally: &mut Tally) {
-        let octant_of = |placed: &Placed| placed.local.cmpge(self.centre).bitmask();
+        let centre = self.centre.extend(0.0);
+        let octant_of = |placed: &Placed| placed.lanes().cmpge(centre).bitmask() & 7;
         let mut rest = points;
         while let Some(first) = rest.first() {
             let number = octant_of(first);
@@ -213,44 +236,30 @@ impl<'a> Cube<'a> {
     /// `None` if there is no node in its 2x2x2 cubes.
     #[inline(always)]
     fn octant(&self, number: u32) -> Option<Octant> {
-        let Turn { axes, strides, near, .. } = self.turn;
-        let is_above = axes.map(|axis| number >> axis & 1 == 1);
-        let columns = &self.columns[usize::from(is_above[0])];
-        // To the next place and the next bit on the side of the octant.
-        let side = |axis: usize| {
-            if is_above[axis] {
-                (strides[axis], near[axis])
-            } else {
-                (strides[axis].wrapping_neg(), near[axis].wrapping_neg())
-            }
-        };
-        let ((along, _), (u, near_u), (v, near_v)) = (side(0), side(1), side(2));
+        let Turn { axes: [axis, ..], along, .. } = *self.turn;
+        let is_above = (number >> axis & 1) as usize;
+        let columns = &self.columns[is_above];
+        let along = if is_above == 1 { along } else { along.wrapping_neg() };
         let place = Places::of_cube(self.bit);
-        let corners = [(0, 0), (u, near_u), (v, near_v), (u.wrapping_add(v), near_u.wrapping_add(near_v))];
         let mut there = 0;
+        let corners = &self.turn.corners[number as usize];
         let places: [usize; 4] = std::array::from_fn(|i| {
-            let (stride, near) = corners[i];
-            let column = Places::NEAR_CENTRE.wrapping_add(near) % 64;
+            let Corner { column, stride } = corners[i];
             there |= (columns.there >> column & 1) << i;
             let outside = (columns.outside >> column & 1) as usize;
-            place.wrapping_add(stride).wrapping_add(along * outside)
+            place.wrapping_add_signed(stride).wrapping_add(along * outside)
         });
         if there == 0 {
             return None;
         }
-        let [a, b, c, d] = STANDINS[there as usize].map(|i| self.see(places[usize::from(i)]));
-        Some(Octant { pairs: [Pair::new(a, b), Pair::new(c, d)], used: there.count_ones() as usize })
-    }
-
-    /// The node at a place.
-    #[inline(always)]
-    fn see(&self, place: usize) -> Seen {
-        let GoodNode { position, normal } = &self.nodes.nodes[place];
-        let side = normal.dot(self.own);
-        let normal = if side < 0.0 { -*normal } else { *normal };
-        let position: &[f32; 4] = position.as_ref();
+        let nodes = STANDINS[there as usize].map(|i| &self.nodes.nodes[places[usize::from(i)]]);
         let [_, u, v] = self.turn.axes;
-        Seen { u: position[u], normal_and_v: normal.with_w(position[v]) }
+        let along = |axis: usize| Vec4::from_array(nodes.map(|node| AsRef::<[f32; 4]>::as_ref(&node.position)[axis]));
+        let [a, b, c, d] = nodes.map(|node| node.normal);
+        let Mat4 { x_axis: x, y_axis: y, z_axis: z, .. } = Mat4::from_cols(a, b, c, d).transpose();
+        let side = x * self.own.xxxx() + y * self.own.yyyy() + z * self.own.zzzz();
+        let [x, y, z] = [x, y, z].map(|lanes| Vec4::select(side.cmplt(Vec4::ZERO), -lanes, lanes));
+        Some(Octant::new(along(u), [x, y, z, along(v)], there.count_ones() as usize))
     }
 
     /// The normal of the nearest node in the 27 cubes; without any, that of the own plane, which may be zero.
@@ -291,65 +300,46 @@ fn along(points: &[Placed], axis: usize) -> Vec4 {
     Vec4::new(at(0), at(1), at(2), at(3))
 }
 
-/// A node as the points of a cube see it.
-#[derive(Clone, Copy)]
-struct Seen {
-    u: f32,
-    /// The normal, on the own normal's side, and v.
-    normal_and_v: Vec4,
-}
-
-/// Two nodes next to each other along u; also what lies between them.
-#[derive(Clone, Copy)]
-struct Pair {
-    u: f32,
-    /// 1 / (difference of u).
-    scale: f32,
-    /// Normal and v at the first node, and what they gain up to the second.
-    first: Vec4,
-    gain: Vec4,
-}
-
-impl Pair {
-    /// Of two nodes that coincide along u, as those do that stand in for one another, the mean counts.
-    #[inline(always)]
-    fn new(a: Seen, b: Seen) -> Self {
-        let (length, gain) = (b.u - a.u, b.normal_and_v - a.normal_and_v);
-        if length == 0.0 {
-            Self { u: a.u, scale: 0.0, first: a.normal_and_v + 0.5 * gain, gain: Vec4::ZERO }
-        } else {
-            Self { u: a.u, scale: 1.0 / length, first: a.normal_and_v, gain }
-        }
-    }
-
-    /// x, y and z of the normal, and v, between the two nodes, at four places (paper, Eq. 15 and 16).
-    #[inline(always)]
-    fn at(&self, u: Vec4) -> [Vec4; 4] {
-        let weight = clamp((u - Vec4::splat(self.u)) * Vec4::splat(self.scale));
-        let (first, gain) = (self.first, self.gain);
-        // One by one: by index it would take four times as long in WebAssembly.
-        [
-            first.xxxx() + gain.xxxx() * weight,
-            first.yyyy() + gain.yyyy() * weight,
-            first.zzzz() + gain.zzzz() * weight,
-            first.wwww() + gain.wwww() * weight,
-        ]
-    }
-}
-
-/// What the points of one octant of a cube share: the four nodes of their 2x2x2 cubes.
+/// What the points of one octant of a cube share: the four nodes of their 2x2x2 cubes, by lane: the near and the far one
+/// along u, in the near row and in the far row. What holds for a row stands in its first lane.
 struct Octant {
-    pairs: [Pair; 2],
+    /// The weight of the far node is `scale * u + start`.
+    scale: Vec4,
+    start: Vec4,
+    /// x, y and z of the normals, on the own normal's side, and v.
+    values: [Vec4; 4],
+    /// What these gain up to the far node.
+    gains: [Vec4; 4],
     /// How many of the four there are.
     used: usize,
 }
 
 impl Octant {
+    /// Of two nodes that coincide along u, as those do that stand in for one another, the mean counts.
+    #[inline(always)]
+    fn new(u: Vec4, values: [Vec4; 4], used: usize) -> Self {
+        let gain = |lanes: Vec4| lanes.yyww() - lanes.xxzz();
+        let length = gain(u);
+        let coincide = length.cmpeq(Vec4::ZERO);
+        let scale = Vec4::select(coincide, Vec4::ZERO, Vec4::ONE / length);
+        let start = Vec4::select(coincide, Vec4::splat(0.5), -u * scale);
+        Self { scale, start, values, gains: values.map(gain), used }
+    }
+
+    /// x, y and z of the normal, and v, between the two nodes of the row whose first lane `row` copies to all four, at
+    /// four places (paper, Eq. 15 and 16).
+    #[inline(always)]
+    fn at(&self, u: Vec4, row: fn(Vec4) -> Vec4) -> [Vec4; 4] {
+        let weight = clamp(u * row(self.scale) + row(self.start));
+        std::array::from_fn(|i| row(self.values[i]) + row(self.gains[i]) * weight)
+    }
+
     /// x, y and z of the interpolated unit normals at four places (paper, Eq. 15 to 17); the own normal where the nodes
     /// cancel each other.
     #[inline(always)]
     fn normals(&self, u: Vec4, v: Vec4, own: Vec4) -> [Vec4; 3] {
-        let ([ax, ay, az, av], [bx, by, bz, bv]) = (self.pairs[0].at(u), self.pairs[1].at(u));
+        let [ax, ay, az, av] = self.at(u, |lanes| lanes.xxxx());
+        let [bx, by, bz, bv] = self.at(u, |lanes| lanes.zzzz());
         let length = bv - av;
         let weight = clamp((v - av) / length);
         let weight = Vec4::select(length.cmpeq(Vec4::ZERO), Vec4::splat(0.5), weight);

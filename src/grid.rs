@@ -7,17 +7,27 @@ use crate::parallel::{self, Filling, Scatter};
 use crate::pca::Moments;
 use crate::points::{CHUNK, Points, reserve};
 use crate::progress::Stage;
+use bytemuck::{Pod, Zeroable};
 use glam::{IVec3, UVec3, Vec3, Vec4};
 use std::mem::MaybeUninit;
 use std::ops::Range;
 
 /// A point in its brick.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(16))]
 pub(crate) struct Placed {
     /// The place in the brick, in edges, 0 to 4.
     pub local: Vec3,
     /// Which point of the input it is.
     pub point: u32,
+}
+
+impl Placed {
+    /// The place, as the first three of four lanes.
+    #[inline(always)]
+    pub fn lanes(self) -> Vec4 {
+        bytemuck::cast(self)
+    }
 }
 
 /// The cubes that hold points, brick by brick, and their points, cube by cube.
