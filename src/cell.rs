@@ -40,7 +40,7 @@ pub(crate) fn paper_edge(extent: DVec3, count: usize) -> f64 {
 }
 
 /// The edge that `cell` asks for, in units of the positions.
-pub(crate) fn edge(cell: Cell, points: &Points, bounds: &Bounds, bulk: &Bulk) -> Result<f64, Error> {
+pub(crate) fn edge(cell: Cell, points: &Points, bounds: &Bounds) -> Result<f64, Error> {
     match cell {
         Cell::Scale(scale) => Ok(scale * paper_edge(bounds.extent(), bounds.finite)),
         Cell::Size(size) => {
@@ -51,7 +51,7 @@ pub(crate) fn edge(cell: Cell, points: &Points, bounds: &Bounds, bulk: &Bulk) ->
             let size = number::text(size);
             Err(Error::input(format_args!("cell.size is {size}, out of all proportion to the cloud; wanted another")))
         }
-        Cell::Auto => populated_edge(points, bounds, bulk),
+        Cell::Auto => populated_edge(points, bounds),
     }
 }
 
@@ -61,13 +61,14 @@ pub(crate) fn edge(cell: Cell, points: &Points, bounds: &Bounds, bulk: &Bulk) ->
 /// So a few points chosen at random ("probes") tell it without bias, whatever the extent of the cloud: the cubes round
 /// them are halved until they hold too few points. Stray points weigh as little as they are few.
 /// Costs one pass over the points.
-fn populated_edge(points: &Points, bounds: &Bounds, bulk: &Bulk) -> Result<f64, Error> {
+fn populated_edge(points: &Points, bounds: &Bounds) -> Result<f64, Error> {
+    let bulk = Bulk::of_points(points);
     let extent = if bulk.extent > 0.0 { bulk.extent } else { bounds.extent().max_element() };
     if extent <= 0.0 || bulk.sample.is_empty() {
         // One point, or hardly any that is finite.
         return Ok(paper_edge(bounds.extent(), bounds.finite));
     }
-    let probes = Probes::place(bulk, extent, bounds.finite);
+    let probes = Probes::place(&bulk, extent, bounds.finite);
     let counts = probes.count(points)?;
     // Points that coincide can't be told apart by any edge, so they count as one.
     let target = POINTS_PER_CELL * counts[LEVELS as usize];

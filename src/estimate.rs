@@ -68,27 +68,21 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     let bounds = Bounds::of(points);
     laps.end("bounds");
 
-    let bulk = Bulk::of(points.len(), &|i| points.positions[i].as_dvec3());
     match options.method {
-        Method::Bilinear => bilinear(points, options, &bounds, &bulk, laps),
+        Method::Bilinear => bilinear(points, options, &bounds, laps),
         _ if !cfg!(feature = "full") => Err(Error::Unsupported("the baselines are not in this build".into())),
-        Method::Knn => baseline(points, Baseline::Knn { k: options.k.unwrap_or(16) as usize }, &bounds, &bulk, laps),
-        Method::Egg => baseline(points, Baseline::Egg { k: options.k.unwrap_or(8) as usize }, &bounds, &bulk, laps),
+        Method::Knn => baseline(points, Baseline::Knn { k: options.k.unwrap_or(16) as usize }, &bounds, laps),
+        Method::Egg => baseline(points, Baseline::Egg { k: options.k.unwrap_or(8) as usize }, &bounds, laps),
     }
 }
 
 /// The paper's method.
-fn bilinear(
-    points: &Points,
-    options: &Options,
-    bounds: &Bounds,
-    bulk: &Bulk,
-    mut laps: Laps,
-) -> Result<Estimate, Error> {
+fn bilinear(points: &Points, options: &Options, bounds: &Bounds, mut laps: Laps) -> Result<Estimate, Error> {
     let progress = laps.progress;
     progress.update("cellSize", 0.03)?;
-    let edge = cell::edge(options.cell, points, bounds, bulk)?;
-    let lattice = Lattice::new(bounds.min.as_dvec3(), bounds.max.as_dvec3(), bulk.median, edge);
+    let edge = cell::edge(options.cell, points, bounds)?;
+    let centre = || Bulk::of_points(points).median;
+    let lattice = Lattice::new(bounds.min.as_dvec3(), bounds.max.as_dvec3(), centre, edge);
     laps.end("cellSize");
 
     let (grid, moments) = Grid::sort(points, &lattice, &progress.stage("sort", 0.06..0.55))?;
@@ -116,15 +110,9 @@ fn bilinear(
 }
 
 /// The methods it is compared with.
-fn baseline(
-    points: &Points,
-    baseline: Baseline,
-    bounds: &Bounds,
-    bulk: &Bulk,
-    mut laps: Laps,
-) -> Result<Estimate, Error> {
+fn baseline(points: &Points, baseline: Baseline, bounds: &Bounds, mut laps: Laps) -> Result<Estimate, Error> {
     let progress = laps.progress;
-    let tree = Tree::build(points, bounds, bulk, &progress.stage("tree", 0.03..0.2))?;
+    let tree = Tree::build(points, bounds, &progress.stage("tree", 0.03..0.2))?;
     laps.end("tree");
     let stage = progress.stage("normals", 0.2..1.0);
     let (normals, resolved) = baseline::normals(&tree, baseline, points.len(), &stage)?;

@@ -20,11 +20,12 @@ pub(crate) struct Lattice {
 }
 
 impl Lattice {
-    /// A grid from `min` to `max`. Where that is more than 2^30 cubes along an axis, 2^29 on either side of `centre`:
+    /// A grid from `min` to `max`. Where that is more than 2^30 cubes along an axis, 2^29 on either side of `centre()`:
     /// points beyond are out of reach.
-    pub fn new(min: DVec3, max: DVec3, centre: DVec3, edge: f64) -> Self {
-        let base = min.max(centre - CUBES / 2.0 * edge);
+    pub fn new(min: DVec3, max: DVec3, centre: impl FnOnce() -> DVec3, edge: f64) -> Self {
         let scale = 1.0 / edge;
+        let is_long = ((max - min) * scale).cmpge(DVec3::splat(CUBES)).any();
+        let base = if is_long { min.max(centre() - CUBES / 2.0 * edge) } else { min };
         // The same product as in `locate`, so that the point on the maximum falls into the last cube.
         let size = (((max - base) * scale).floor() + 1.0).clamp(DVec3::ONE, DVec3::splat(CUBES));
         Self { base, scale, size }

@@ -90,7 +90,7 @@ mod tests {
         let points = Points::from_f32(bytemuck::cast_slice(&positions)).unwrap();
         let (min, max) = (DVec3::ZERO, DVec3::new(1.0, 3.0, 1.0));
         for edge in [0.03, 0.11, 0.25] {
-            let lattice = Lattice::new(min, max, min, edge);
+            let lattice = Lattice::new(min, max, || min, edge);
             let progress = Progress::silent();
             let stage = progress.stage("test", 0.0..1.0);
             let (grid, moments) = Grid::sort(&points, &lattice, &stage).unwrap();

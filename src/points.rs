@@ -161,6 +161,11 @@ pub(crate) struct Bulk {
 }
 
 impl Bulk {
+    /// Looks at a cloud.
+    pub fn of_points(points: &Points) -> Self {
+        Self::of(points.len(), &|i| points.positions[i].as_dvec3())
+    }
+
     /// Looks at `at(0) .. at(count - 1)`, at most a few thousand of them; non-finite points are passed over.
     pub fn of(count: usize, at: &dyn Fn(usize) -> DVec3) -> Self {
         let step = count.div_ceil(SAMPLE).max(1);

@@ -68,7 +68,8 @@ pub(crate) struct Tree {
 
 impl Tree {
     /// In n log n time.
-    pub fn build(points: &Points, bounds: &Bounds, bulk: &Bulk, stage: &Stage) -> Result<Self, Error> {
+    pub fn build(points: &Points, bounds: &Bounds, stage: &Stage) -> Result<Self, Error> {
+        let bulk = Bulk::of_points(points);
         let extent = if bulk.extent > 0.0 { bulk.extent } else { bounds.extent().max_element() };
         // A power of two, so that scaling loses nothing.
         let unit = if extent > 0.0 { exp2(log2(extent).round()) } else { 1.0 };
@@ -289,9 +290,9 @@ mod tests {
         let equal = [1.0, 2.0, 3.0].repeat(100);
         for (name, coordinates) in [("volume", volume), ("uneven", uneven), ("grid", grid), ("equal", equal)] {
             let points = Points::from_f32(&coordinates).unwrap();
-            let (bounds, bulk) = (Bounds::of(&points), Bulk::of(points.len(), &|i| points.positions[i].as_dvec3()));
+            let bounds = Bounds::of(&points);
             let progress = Progress::silent();
-            let tree = Tree::build(&points, &bounds, &bulk, &progress.stage("tree", 0.0..1.0)).unwrap();
+            let tree = Tree::build(&points, &bounds, &progress.stage("tree", 0.0..1.0)).unwrap();
             for k in [1, 3, 8, 50, tree.places.len()] {
                 let mut search = Search::new(&tree, k);
                 for query in tree.places.iter().step_by(7) {
