@@ -2,7 +2,7 @@
 
 use crate::bricks::{Bricks, OUTSIDE, set_bits};
 use crate::error::Error;
-use crate::lattice::{Lattice, cube_centre, cube_in_brick, octant_in_brick};
+use crate::lattice::{Lattice, cube_centre, octant_in_brick};
 use crate::parallel::{self, Filling, Scatter};
 use crate::pca::Moments;
 use crate::points::{CHUNK, Points, reserve};
@@ -89,8 +89,14 @@ impl Grid {
                 let last = first_point[brick + 1] as usize;
                 for (cube, bit) in (first_cube[brick] as usize..).zip(set_bits(masks[brick])) {
                     let points = &placed[start..last];
-                    let length = points.iter().take_while(|point| cube_in_brick(point.local) == bit).count();
                     let centre = cube_centre(bit);
+                    let (low, high) = ((centre - 0.5).extend(0.0), (centre + 0.5).extend(0.0));
+                    // They are sorted by cube: the first outside ends it.
+                    let is_inside = |point: &&Placed| {
+                        let place = point.lanes();
+                        (place.cmpge(low) & place.cmplt(high)).bitmask() & 7 == 7
+                    };
+                    let length = points.iter().take_while(is_inside).count();
                     start += length;
                     // SAFETY: a cube belongs to one brick, and a brick to one block.
                     unsafe {
@@ -202,7 +208,7 @@ fn sort_by_cube(by_brick: &[Placed], first_point: &[u32], stage: &Stage) -> Resu
 fn sort_brick(points: &[Placed], sorted: &mut [MaybeUninit<Placed>], next: &mut [u32; 8 * 64]) -> u64 {
     let mut mask = 0;
     for point in points {
-        let octant = octant_in_brick(point.local);
+        let octant = octant_in_brick(point.lanes());
         next[octant as usize] += 1;
         mask |= 1 << (octant / 8);
     }
@@ -212,7 +218,7 @@ fn sort_brick(points: &[Placed], sorted: &mut [MaybeUninit<Placed>], next: &mut 
         total += std::mem::replace(&mut next[octant], total);
     }
     for point in points {
-        let next = &mut next[octant_in_brick(point.local) as usize];
+        let next = &mut next[octant_in_brick(point.lanes()) as usize];
         sorted[*next as usize].write(*point);
         *next += 1;
     }

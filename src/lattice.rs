@@ -1,6 +1,6 @@
 //! From a position to its cube, and back.
 
-use glam::{DVec3, IVec3, UVec3, Vec3};
+use glam::{DVec3, IVec3, UVec3, Vec3, Vec4, Vec4Swizzles};
 
 /// Cubes along the edge of a brick.
 pub(crate) const BRICK: i32 = 4;
@@ -56,20 +56,14 @@ impl Lattice {
 /// The largest number below 4.
 const BELOW_BRICK: f32 = (BRICK as f32).next_down();
 
-/// The cube of a place in a brick: `x + 4 y + 16 z`.
-#[inline]
-pub(crate) fn cube_in_brick(local: Vec3) -> u32 {
-    let cube = local.as_uvec3();
-    cube.x + 4 * cube.y + 16 * cube.z
-}
-
-/// The octant of a place in a brick: eight times its cube, and bits 0, 1 and 2 tell whether it is not below the cube's
-/// centre along x, y and z.
-#[inline]
-pub(crate) fn octant_in_brick(local: Vec3) -> u32 {
-    let half = (local * 2.0).as_uvec3();
-    let (cube, above) = (half >> 1u32, half & 1u32);
-    8 * (cube.x + 4 * cube.y + 16 * cube.z) + above.x + 2 * above.y + 4 * above.z
+/// The octant of a place in a brick (the first three of four lanes): eight times its cube `x + 4 y + 16 z`, and bits 0, 1
+/// and 2 tell whether it is not below the cube's centre along x, y and z.
+#[inline(always)]
+pub(crate) fn octant_in_brick(place: Vec4) -> u32 {
+    let (cube, half) = (place.floor(), (2.0 * place).floor());
+    // In whole numbers up to 511; a half without twice its cube is 0 or 1.
+    let octant = half * Vec4::new(1.0, 2.0, 4.0, 0.0) + cube * Vec4::new(6.0, 28.0, 120.0, 0.0);
+    octant.xyz().element_sum() as u32
 }
 
 /// The centre of the cube with bit `bit`, in the brick.
