@@ -51,7 +51,7 @@ struct Tally {
     resolved: u64,
 }
 
-/// A node that takes part in the interpolation. The fourth lanes are zero.
+/// A node that takes part in the interpolation. The fourth lanes mean nothing.
 #[derive(Clone, Copy)]
 struct GoodNode {
     /// In the brick, in edges.
@@ -71,15 +71,12 @@ impl GoodNodes {
         Self { there: Places::NONE, nodes: [GoodNode { position: Vec4::ZERO, normal: Vec4::ZERO }; Places::COUNT] };
 
     fn fill(&mut self, surroundings: &Surroundings, nodes: &[Node]) {
-        self.there = Places::NONE;
-        for place in surroundings.occupied.iter() {
-            let node = nodes[surroundings.cube(place)];
-            if node.is_good() {
-                self.there.insert(place);
-                let position = Places::centre(place) + node.position();
-                self.nodes[place] = GoodNode { position: position.extend(0.0), normal: node.normal.extend(0.0) };
-            }
-        }
+        self.there = surroundings.occupied.filter(|place| {
+            let node = &nodes[surroundings.cube(place)];
+            let position = Places::centre(place).extend(0.0) + node.position();
+            self.nodes[place] = GoodNode { position, normal: node.lanes() };
+            node.is_good()
+        });
     }
 }
 
@@ -267,7 +264,7 @@ impl<'a> Cube<'a> {
         let mut nearest = (f32::INFINITY, self.own);
         for near in set_bits(self.nodes.there.near(self.bit)) {
             let node = &self.nodes.nodes[Places::of_near(self.bit, near)];
-            let distance = node.position.distance_squared(point.extend(0.0));
+            let distance = node.position.xyz().distance_squared(point);
             if distance < nearest.0 {
                 nearest = (distance, node.normal);
             }

@@ -298,9 +298,16 @@ impl Places {
         self.0[place / 36] |= 1 << (place % 36);
     }
 
-    /// All of them, lowest first.
-    pub fn iter(&self) -> impl Iterator<Item = usize> {
-        self.0.iter().enumerate().flat_map(|(z, &word)| set_bits(word).map(move |bit| 36 * z + bit as usize))
+    /// Those that pass a test.
+    #[inline(always)]
+    pub fn filter(&self, mut test: impl FnMut(usize) -> bool) -> Self {
+        let mut passed = Self::NONE;
+        for (z, (word, passed)) in self.0.iter().zip(&mut passed.0).enumerate() {
+            for bit in set_bits(*word) {
+                *passed |= u64::from(test(36 * z + bit as usize)) << bit;
+            }
+        }
+        passed
     }
 
     /// Those among the 27 round the cube with bit `bit` of the brick, as bits `x + 6 y + 16 z`, each 0 to 2.

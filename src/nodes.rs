@@ -6,15 +6,16 @@ use crate::grid::{Grid, NEAR, Places, Surroundings};
 use crate::parallel::Filling;
 use crate::pca::Moments;
 use crate::progress::Stage;
-use bytemuck::Zeroable;
-use glam::Vec3;
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec3, Vec4};
 
 /// The plane through the points of a cube and the 26 round it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C, align(16))]
 pub(crate) struct Node {
     /// The unit normal (paper, Eq. 6); zero when the points determine no plane.
     pub normal: Vec3,
-    /// How far the plane lies from the cube's centre along the normal, in edges (r of Eq. 13).
+    /// How far the plane lies from the cube's centre along the normal, in edges (r of Eq. 13); infinite without a plane.
     pub offset: f32,
 }
 
@@ -22,7 +23,7 @@ impl Node {
     fn of(surroundings: &Moments) -> Self {
         match surroundings.plane() {
             Some((centroid, normal)) => Self { normal, offset: normal.dot(centroid) },
-            None => Self { normal: Vec3::ZERO, offset: 0.0 },
+            None => Self { normal: Vec3::ZERO, offset: f32::INFINITY },
         }
     }
 
@@ -31,14 +32,23 @@ impl Node {
         self.normal != Vec3::ZERO
     }
 
-    /// The node's position against the cube's centre, in edges: the centre projected onto the plane (Eq. 14).
-    pub fn position(&self) -> Vec3 {
-        self.normal * self.offset
+    /// The normal, as the first three of four lanes.
+    #[inline(always)]
+    pub fn lanes(&self) -> Vec4 {
+        bytemuck::cast(*self)
+    }
+
+    /// The node's position against the cube's centre, in edges: the centre projected onto the plane (Eq. 14). In three of
+    /// four lanes; not a number without a plane.
+    #[inline(always)]
+    pub fn position(&self) -> Vec4 {
+        self.lanes() * self.offset
     }
 
     /// Whether the cube holds the node, so that it takes part in the interpolation.
+    #[inline(always)]
     pub fn is_good(&self) -> bool {
-        self.has_plane() && self.position().abs().max_element() <= 0.5
+        self.position().abs().cmple(Vec4::splat(0.5)).bitmask() & 7 == 7
     }
 }
 
