@@ -72,7 +72,7 @@ fn face([x, y, z]: [Vec4; 3]) -> [Vec4; 3] {
     // On the plane itself the first component that is not zero decides.
     let first = Vec4::select(x.cmpeq(Vec4::ZERO), y, x);
     let side = Vec4::select(side.cmpeq(Vec4::ZERO), first, side);
-    let is_behind = side.cmplt(Vec4::ZERO);
+    let sign = Vec4::select(side.cmplt(Vec4::ZERO), Vec4::NEG_ONE, Vec4::ONE);
     // Adding zero turns -0 into 0.
-    [x, y, z].map(|lanes| Vec4::select(is_behind, Vec4::ZERO - lanes, lanes + Vec4::ZERO))
+    [x, y, z].map(|lanes| lanes * sign + Vec4::ZERO)
 }
