@@ -144,6 +144,7 @@ impl Bricks {
     }
 
     /// The number of the brick at a place, if it is occupied.
+    #[inline(always)]
     pub fn number(&self, brick: IVec3) -> Option<u32> {
         match &self.index {
             Index::Box { size, bits, before } => {

@@ -260,18 +260,13 @@ impl Surroundings {
     /// Looks up the 27 bricks around and in place of brick `brick`.
     pub fn look(&mut self, grid: &Grid, brick: usize) {
         self.occupied = Places::NONE;
-        for step in STEPS {
-            let number = if step == IVec3::ZERO {
-                Some(brick as u32)
-            } else {
-                grid.bricks.number(grid.bricks.places[brick] + step)
-            };
-            let Some(number) = number else { continue };
+        let place = grid.bricks.places[brick];
+        for Side { step, facing, shift } in &SIDES {
+            let Some(number) = grid.bricks.number(place + step) else { continue };
             let (mask, first) = (grid.masks[number as usize], grid.first_cube[number as usize]);
-            let shift = 4 * Places::stride(step);
-            for bit in set_bits(mask & facing(step)) {
+            for bit in set_bits(mask & facing) {
                 let before = (mask & ((1 << bit) - 1)).count_ones();
-                let place = Places::of_cube(bit).wrapping_add_signed(shift);
+                let place = Places::of_cube(bit).wrapping_add_signed(*shift);
                 self.occupied.insert(place);
                 self.cubes[place] = first + before;
             }
@@ -334,12 +329,6 @@ impl Places {
         (43 + (bit & 3) + 6 * (bit >> 2 & 3) + 36 * (bit >> 4)) as usize
     }
 
-    /// What lies between the places of two cubes.
-    #[inline]
-    pub fn stride(step: IVec3) -> isize {
-        (step.x + 6 * step.y + 36 * step.z) as isize
-    }
-
     /// The centre of the cube at a place, in the brick, in edges.
     #[inline]
     pub fn centre(place: usize) -> Vec3 {
@@ -378,11 +367,27 @@ pub(crate) const STEPS: [IVec3; 27] = {
     steps
 };
 
-/// The cubes of the brick `step` away that touch this brick.
-fn facing(step: IVec3) -> u64 {
+/// A brick next to another, or that itself.
+struct Side {
+    /// How many bricks away.
+    step: IVec3,
+    /// Its cubes that touch the other brick.
+    facing: u64,
+    /// From the place of a cube of the other brick to that of the same cube of this one.
+    shift: isize,
+}
+
+const SIDES: [Side; 27] = {
     const X: [u64; 3] = [0x8888_8888_8888_8888, u64::MAX, 0x1111_1111_1111_1111];
     const Y: [u64; 3] = [0xF000_F000_F000_F000, u64::MAX, 0x000F_000F_000F_000F];
     const Z: [u64; 3] = [0xFFFF_0000_0000_0000, u64::MAX, 0x0000_0000_0000_FFFF];
-    let [x, y, z] = (step + 1).to_array().map(|i| i as usize);
-    X[x] & Y[y] & Z[z]
-}
+    let mut sides = [const { Side { step: IVec3::ZERO, facing: 0, shift: 0 } }; 27];
+    let mut i = 0;
+    while i < 27 {
+        let step = STEPS[i];
+        let facing = X[(step.x + 1) as usize] & Y[(step.y + 1) as usize] & Z[(step.z + 1) as usize];
+        sides[i] = Side { step, facing, shift: 4 * (step.x + 6 * step.y + 36 * step.z) as isize };
+        i += 1;
+    }
+    sides
+};
