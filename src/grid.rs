@@ -172,9 +172,8 @@ fn sort_by_brick(
         let next = unsafe { shared.slice(of_piece(i)) };
         for point in parallel::piece(count, size, i) {
             let key = keys[point] as usize;
-            if let Some(next) = next.get_mut(key)
-                && let Some((_, local)) = lattice.locate(points.positions[point])
-            {
+            if let Some(next) = next.get_mut(key) {
+                let (_, local) = lattice.place(points.positions[point]);
                 // SAFETY: `next` runs through the part of this piece and this brick, which the sums above gave to no
                 // other piece and no other brick.
                 unsafe { placed.write(*next as usize, Placed { local, point: point as u32 }) };

@@ -44,12 +44,27 @@ impl Lattice {
     #[inline]
     pub fn locate(&self, point: Vec3) -> Option<(IVec3, Vec3)> {
         let place = (point.as_dvec3() - self.base) * self.scale;
-        if !(place.cmpge(DVec3::ZERO) & place.cmplt(self.size)).all() {
-            return None;
-        }
+        // Number by number: as masks of three doubles it takes noticeably longer.
+        let is_inside = (place.x >= 0.0)
+            & (place.y >= 0.0)
+            & (place.z >= 0.0)
+            & (place.x < self.size.x)
+            & (place.y < self.size.y)
+            & (place.z < self.size.z);
+        is_inside.then(|| Self::split(place))
+    }
+
+    /// The same for a point that is known to have a place.
+    #[inline]
+    pub fn place(&self, point: Vec3) -> (IVec3, Vec3) {
+        Self::split((point.as_dvec3() - self.base) * self.scale)
+    }
+
+    #[inline(always)]
+    fn split(place: DVec3) -> (IVec3, Vec3) {
         let brick = (place * (1.0 / f64::from(BRICK))).as_ivec3();
         let local = (place - brick.as_dvec3() * f64::from(BRICK)).as_vec3();
-        Some((brick, local.min(Vec3::splat(BELOW_BRICK))))
+        (brick, local.min(Vec3::splat(BELOW_BRICK)))
     }
 }
 
