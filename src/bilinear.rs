@@ -2,11 +2,12 @@
 
 use crate::bricks::set_bits;
 use crate::error::Error;
-use crate::grid::{Grid, MIDDLE, NEAR_STRIDES, Placed, Places, Surroundings};
+use crate::grid::{Grid, Placed};
 use crate::lattice::cube_centre;
 use crate::nodes::Node;
 use crate::normals::Normals;
 use crate::progress::Stage;
+use crate::surroundings::{MIDDLE, Places, Surroundings};
 use glam::{Mat4, Vec3, Vec4, Vec4Swizzles};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -105,9 +106,9 @@ struct Corner {
 }
 
 const TURNS: [Turn; 3] = {
-    const STRIDES: [isize; 3] = [1, 6, 36];
     const fn turn(axes: [usize; 3]) -> Turn {
         let [a, u, v] = axes;
+        let (strides, near) = (Places::STRIDES, Places::NEAR_STRIDES);
         let mut corners = [[Corner { column: 0, stride: 0 }; 4]; 8];
         let mut i = 0;
         while i < 32 {
@@ -116,14 +117,13 @@ const TURNS: [Turn; 3] = {
             let step_u = (corner & 1) as isize * if octant >> u & 1 == 1 { 1 } else { -1 };
             let step_v = (corner >> 1) as isize * if octant >> v & 1 == 1 { 1 } else { -1 };
             corners[octant][corner] = Corner {
-                column: (Places::NEAR_CENTRE as isize
-                    + step_u * NEAR_STRIDES[u] as isize
-                    + step_v * NEAR_STRIDES[v] as isize) as u32,
-                stride: step_u * STRIDES[u] + step_v * STRIDES[v],
+                column: Places::NEAR_CENTRE.wrapping_add_signed((step_u * near[u] + step_v * near[v]) as i32),
+                stride: step_u * strides[u] + step_v * strides[v],
             };
             i += 1;
         }
-        Turn { axes, along: STRIDES[a] as usize, along_near: NEAR_STRIDES[a], middle: MIDDLE[a], corners }
+        let (along, along_near) = (strides[a] as usize, near[a] as u32);
+        Turn { axes, along, along_near, middle: MIDDLE[a], corners }
     }
     [turn([0, 1, 2]), turn([1, 2, 0]), turn([2, 0, 1])]
 };
@@ -179,12 +179,10 @@ impl<'a> Cube<'a> {
         let near = self.nodes.there.near(self.bit);
         let Turn { along, along_near, middle, .. } = *self.turn;
         let inside = near & middle;
-        let outsides = [(near << along_near) & middle, (near >> along_near) & middle];
-        for (columns, (outside, along)) in
-            self.columns.iter_mut().zip(outsides.into_iter().zip([along.wrapping_neg(), along]))
-        {
-            columns.there = inside | outside;
-            columns.outside = outside & !inside;
+        let sides = [(near << along_near, along.wrapping_neg()), (near >> along_near, along)];
+        for (columns, (outside, along)) in self.columns.iter_mut().zip(sides) {
+            let outside = outside & middle;
+            *columns = Columns { there: inside | outside, outside: outside & !inside };
             for column in set_bits(inside & outside) {
                 let place = Places::of_near(self.bit, column);
                 let distance = |place: usize| (self.own.dot(self.nodes.nodes[place].position) - offset).abs();

@@ -27,6 +27,7 @@ pub mod ply;
 mod points;
 mod power;
 mod progress;
+mod surroundings;
 #[cfg(target_arch = "wasm32")]
 pub mod wasm;
 

@@ -2,10 +2,11 @@
 
 use crate::bricks::set_bits;
 use crate::error::Error;
-use crate::grid::{Grid, NEAR, Places, Surroundings};
+use crate::grid::Grid;
 use crate::parallel::Filling;
 use crate::pca::Moments;
 use crate::progress::Stage;
+use crate::surroundings::{NEAR, Places, Surroundings};
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec3, Vec4};
 
