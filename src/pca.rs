@@ -91,7 +91,8 @@ impl Symmetric {
         // lambda1 + lambda2 and lambda1 * lambda2, and from them a lower bound of lambda2 = product / lambda1.
         let sum = trace - smallest;
         let product = (self.minors() - smallest * sum).max(0.0);
-        if product <= LINE * sum * sum.max(unit) {
+        // Of points in one place both are rounding, of either sign.
+        if product <= LINE * sum.abs() * sum.max(unit) {
             return None;
         }
         let (d, o) = (self.diagonal - smallest, self.off);
@@ -165,6 +166,11 @@ mod tests {
         let line = |step: Vec3| Moments::of((0..100).map(|i| step * (i as f32 / 100.0 - 0.5)));
         for step in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::new(0.5, -0.7, 0.3), Vec3::ZERO] {
             assert_eq!(line(step).plane(), None, "{step}");
+        }
+        // Rounding makes the covariance of four of these negative.
+        let place = Vec3::new(0.16168785, -0.4859402, -0.3734617);
+        for count in 1..100 {
+            assert_eq!(Moments::of([place].into_iter().cycle().take(count)).plane(), None, "{count} points");
         }
     }
 }
