@@ -16,6 +16,11 @@ use crate::progress::Progress;
 pub struct Estimate {
     /// `nx0 ny0 nz0 nx1 ...`, one unit vector a point in the order of the input, or zero for an unresolved point.
     pub normals: Vec<f32>,
+    /// If asked for, the surface variation `lambda3 / (lambda1 + lambda2 + lambda3)` of each point's neighbourhood, from 0
+    /// (flat) to 1/3 (Pauly, Gross and Kobbelt 2002); 0 for an unresolved point. The neighbourhood of a node is that of its
+    /// normal, the 27 cubes, and a point has the mean of its nodes, by the weights of its normal; for the baselines it
+    /// is the k nearest points, for [`Method::Egg`] together with the point itself.
+    pub curvature: Option<Vec<f32>>,
     /// What was done.
     pub report: Report,
 }
@@ -71,8 +76,8 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     match options.method {
         Method::Bilinear => bilinear(points, options, &bounds, laps),
         _ if !cfg!(feature = "full") => Err(Error::Unsupported("the baselines are not in this build".into())),
-        Method::Knn => baseline(points, Baseline::Knn { k: options.k.unwrap_or(16) as usize }, &bounds, laps),
-        Method::Egg => baseline(points, Baseline::Egg { k: options.k.unwrap_or(8) as usize }, &bounds, laps),
+        Method::Knn => baseline(points, options, Baseline::Knn { k: options.k.unwrap_or(16) as usize }, &bounds, laps),
+        Method::Egg => baseline(points, options, Baseline::Egg { k: options.k.unwrap_or(8) as usize }, &bounds, laps),
     }
 }
 
@@ -87,17 +92,18 @@ fn bilinear(points: &Points, options: &Options, bounds: &Bounds, mut laps: Laps)
 
     let (grid, moments) = Grid::sort(points, &lattice, &progress.stage("sort", 0.06..0.55))?;
     laps.end("sort");
-    let nodes = nodes::nodes(&grid, &moments, &progress.stage("nodes", 0.55..0.65))?;
+    let stage = progress.stage("nodes", 0.55..0.65);
+    let (nodes, variations) = nodes::nodes(&grid, &moments, options.curvature, &stage)?;
     drop(moments);
     laps.end("nodes");
     let stage = progress.stage("interpolation", 0.65..1.0);
-    let (normals, resolved, nodes_used) = bilinear::interpolate(&grid, &nodes, points.len(), &stage)?;
+    let (found, nodes_used) = bilinear::interpolate(&grid, &nodes, variations.as_deref(), points.len(), &stage)?;
     laps.end("interpolation");
 
     let paper_edge = cell::paper_edge(bounds.extent(), bounds.finite);
     let report = Report {
         points: points.len() as u64,
-        unresolved: points.len() as u64 - resolved,
+        unresolved: points.len() as u64 - found.resolved,
         cells: grid.cubes() as u64,
         nodes: nodes.iter().filter(|node| Node::is_good(node)).count() as u64,
         grid: lattice.size.as_u64vec3().to_array(),
@@ -106,26 +112,32 @@ fn bilinear(points: &Points, options: &Options, bounds: &Bounds, mut laps: Laps)
         nodes_used,
         milliseconds: laps.ended,
     };
-    Ok(Estimate { normals, report })
+    Ok(Estimate { normals: found.normals, curvature: found.curvature, report })
 }
 
 /// The methods it is compared with.
-fn baseline(points: &Points, baseline: Baseline, bounds: &Bounds, mut laps: Laps) -> Result<Estimate, Error> {
+fn baseline(
+    points: &Points,
+    options: &Options,
+    baseline: Baseline,
+    bounds: &Bounds,
+    mut laps: Laps,
+) -> Result<Estimate, Error> {
     let progress = laps.progress;
     let tree = Tree::build(points, bounds, &progress.stage("tree", 0.03..0.2))?;
     laps.end("tree");
     let stage = progress.stage("normals", 0.2..1.0);
-    let (normals, resolved) = baseline::normals(&tree, baseline, points.len(), &stage)?;
+    let found = baseline::normals(&tree, baseline, options.curvature, points.len(), &stage)?;
     laps.end("normals");
     let count = points.len() as u64;
     let report = Report {
         points: count,
-        unresolved: count - resolved,
+        unresolved: count - found.resolved,
         nodes_used: [count, 0, 0, 0, 0],
         milliseconds: laps.ended,
         ..Report::default()
     };
-    Ok(Estimate { normals, report })
+    Ok(Estimate { normals: found.normals, curvature: found.curvature, report })
 }
 
 /// A stop-watch that notes a time for each phase.

@@ -4,7 +4,7 @@ use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::parallel::Filling;
-use crate::pca::Moments;
+use crate::pca::{Moments, Plane};
 use crate::progress::Stage;
 use crate::surroundings::{NEAR, Places, Surroundings};
 use bytemuck::{Pod, Zeroable};
@@ -21,9 +21,9 @@ pub(crate) struct Node {
 }
 
 impl Node {
-    fn of(surroundings: &Moments) -> Self {
-        match surroundings.plane() {
-            Some((centroid, normal)) => Self { normal, offset: normal.dot(centroid) },
+    fn of(plane: Option<Plane>) -> Self {
+        match plane {
+            Some(Plane { normal, centroid, .. }) => Self { normal, offset: normal.dot(centroid) },
             None => Self { normal: Vec3::ZERO, offset: f32::INFINITY },
         }
     }
@@ -53,9 +53,16 @@ impl Node {
     }
 }
 
-/// The node of every cube, in the order of the grid.
-pub(crate) fn nodes(grid: &Grid, moments: &[Moments], stage: &Stage) -> Result<Vec<Node>, Error> {
+/// The node of every cube, in the order of the grid; with `curvature` also the surface variation of its points, 0 without
+/// a plane.
+pub(crate) fn nodes(
+    grid: &Grid,
+    moments: &[Moments],
+    curvature: bool,
+    stage: &Stage,
+) -> Result<(Vec<Node>, Option<Vec<f32>>), Error> {
     let nodes = Filling::new(grid.cubes(), "the nodes")?;
+    let variations = curvature.then(|| Filling::new(grid.cubes(), "the curvature")).transpose()?;
     stage.run(grid.blocks.len(), &|block| {
         let mut surroundings = Surroundings::new();
         for brick in grid.blocks[block].clone() {
@@ -66,13 +73,19 @@ pub(crate) fn nodes(grid: &Grid, moments: &[Moments], stage: &Stage) -> Result<V
                     let cube = surroundings.cube(Places::of_near(bit, near));
                     sum.add_shifted(&moments[cube], NEAR[near as usize % 64]);
                 }
+                let plane = sum.plane();
                 // SAFETY: a cube belongs to one brick, and a brick to one block.
-                unsafe { nodes.write(cube, Node::of(&sum)) };
+                unsafe {
+                    nodes.write(cube, Node::of(plane));
+                    if let Some(variations) = &variations {
+                        variations.write(cube, plane.map_or(0.0, |plane| plane.variation));
+                    }
+                }
             }
         }
     })?;
     // SAFETY: the blocks hold all bricks, and these all cubes.
-    Ok(unsafe { nodes.complete() })
+    Ok(unsafe { (nodes.complete(), variations.map(|variations| variations.complete())) })
 }
 
 #[cfg(test)]
@@ -105,14 +118,15 @@ mod tests {
             let progress = Progress::silent();
             let stage = progress.stage("test", 0.0..1.0);
             let (grid, moments) = Grid::sort(&points, &lattice, &stage).unwrap();
-            let nodes = nodes(&grid, &moments, &stage).unwrap();
+            let (nodes, variations) = nodes(&grid, &moments, true, &stage).unwrap();
+            let mut variations = variations.unwrap().into_iter();
 
             let cube = |p: &Vec3| (p.as_dvec3() / edge).floor().as_ivec3();
             let mut nodes = nodes.iter();
             let mut planes = 0;
             for brick in 0..grid.bricks.len() {
                 for (points, bit) in grid.cubes_of(brick) {
-                    let node = nodes.next().unwrap();
+                    let (node, variation) = (nodes.next().unwrap(), f64::from(variations.next().unwrap()));
                     let place = 4 * grid.bricks.places[brick]
                         + IVec3::new(bit as i32 & 3, bit as i32 >> 2 & 3, bit as i32 >> 4);
                     let mut own: Vec<u32> = (0..3000).filter(|i| cube(&positions[*i as usize]) == place).collect();
@@ -136,6 +150,7 @@ mod tests {
                     }) * (1.0 / near.len() as f64);
                     if !node.has_plane() {
                         assert!(near.len() < 4, "{} points without a plane", near.len());
+                        assert_eq!(variation, 0.0);
                         continue;
                     }
                     // The normal is an eigenvector, and the smallest of the Rayleigh quotients is its own.
@@ -146,6 +161,8 @@ mod tests {
                         let other = other.normalize();
                         assert!(other.dot(covariance * other) > value - 2e-6, "not the smallest");
                     }
+                    let trace: f64 = (0..3).map(|i| covariance.col(i)[i]).sum();
+                    assert!((variation * trace - value).abs() < 2e-6, "{variation}, {value} of {trace}");
                     assert!((f64::from(node.offset) - normal.dot(mean)).abs() < 2e-6, "not through the centroid");
                     planes += 1;
                 }

@@ -1,4 +1,4 @@
-//! One normal for each point, as every method hands them over.
+//! One normal for each point, and if wanted its curvature, as every method hands them over.
 
 use crate::error::Error;
 use crate::parallel::{self, Filling};
@@ -10,30 +10,55 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 /// The normals of all points of the input while they are found, point by point and in any order.
 pub(crate) struct Normals {
     normals: Filling<Vec3>,
+    /// The surface variation of the same points, if it was asked for.
+    curvature: Option<Filling<f32>>,
     resolved: AtomicU64,
+}
+
+/// What was found for all points.
+pub(crate) struct Found {
+    /// `nx0 ny0 nz0 nx1 ...`
+    pub normals: Vec<f32>,
+    /// The surface variation of each point, if it was asked for.
+    pub curvature: Option<Vec<f32>>,
+    /// How many of the points were resolved.
+    pub resolved: u64,
 }
 
 impl Normals {
     /// For `count` points, of which `expected` will be written; if these are not all, the others are zero.
-    pub fn new(count: usize, expected: usize) -> Result<Self, Error> {
+    pub fn new(count: usize, expected: usize, curvature: bool) -> Result<Self, Error> {
         let normals = Filling::new(count, "the normals")?;
+        let curvature = curvature.then(|| Filling::new(count, "the curvature")).transpose()?;
         if expected < count {
-            // SAFETY: each normal belongs to one chunk, and nothing else is written meanwhile.
+            // SAFETY: each point belongs to one chunk, and nothing else is written meanwhile.
             parallel::each(count.div_ceil(CHUNK), &|i| unsafe {
-                normals.slice(parallel::piece(count, CHUNK, i)).fill(MaybeUninit::new(Vec3::ZERO));
+                let piece = parallel::piece(count, CHUNK, i);
+                normals.slice(piece.clone()).fill(MaybeUninit::new(Vec3::ZERO));
+                if let Some(curvature) = &curvature {
+                    curvature.slice(piece).fill(MaybeUninit::new(0.0));
+                }
             });
         }
-        Ok(Self { normals, resolved: AtomicU64::new(0) })
+        Ok(Self { normals, curvature, resolved: AtomicU64::new(0) })
     }
 
-    /// Takes the normal of a point, of either sign; zero if nothing determines one.
+    /// Whether the curvature of each point was asked for, and must be written too.
+    pub fn has_curvature(&self) -> bool {
+        self.curvature.is_some()
+    }
+
+    /// Takes the normal of a point, of either sign, and its curvature; zero if nothing determines them.
     ///
     /// # Safety
     /// At most once for each point.
     #[inline(always)]
-    pub unsafe fn write(&self, point: u32, normal: Vec3) {
+    pub unsafe fn write(&self, point: u32, normal: Vec3, curvature: f32) {
         // SAFETY: by the caller's promise.
-        unsafe { self.write_lanes([point].into_iter(), normal.to_array().map(Vec4::splat)) }
+        unsafe {
+            self.write_lanes([point].into_iter(), normal.to_array().map(Vec4::splat));
+            self.write_curvature(point, curvature);
+        }
     }
 
     /// Takes the normals of up to four points, lane by lane, of either sign.
@@ -49,19 +74,33 @@ impl Normals {
         }
     }
 
+    /// Takes the curvature of a point, unless it was not asked for.
+    ///
+    /// # Safety
+    /// At most once for each point.
+    #[inline(always)]
+    pub unsafe fn write_curvature(&self, point: u32, curvature: f32) {
+        if let Some(all) = &self.curvature {
+            // SAFETY: by the caller's promise.
+            unsafe { all.write(point as usize, curvature) };
+        }
+    }
+
     /// Counts points that were given a normal other than zero.
     pub fn add_resolved(&self, points: u64) {
         self.resolved.fetch_add(points, Relaxed);
     }
 
-    /// `nx0 ny0 nz0 nx1 ...`, and how many of the points were resolved.
+    /// All that was taken.
     ///
     /// # Safety
     /// As many points must have been written as [`Normals::new`] was told.
-    pub unsafe fn complete(self) -> (Vec<f32>, u64) {
+    pub unsafe fn complete(self) -> Found {
         // SAFETY: all points were written, by the caller's promise, or zeroed before.
-        let normals = unsafe { self.normals.complete() };
-        (bytemuck::cast_vec::<Vec3, [f32; 3]>(normals).into_flattened(), self.resolved.into_inner())
+        let (normals, curvature) =
+            unsafe { (self.normals.complete(), self.curvature.map(|curvature| curvature.complete())) };
+        let normals = bytemuck::cast_vec::<Vec3, [f32; 3]>(normals).into_flattened();
+        Found { normals, curvature, resolved: self.resolved.into_inner() }
     }
 }
 

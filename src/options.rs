@@ -15,7 +15,7 @@ pub struct Options {
     pub k: Option<u32>,
     /// How signs are chosen. Default: [`Orient::None`].
     pub orient: Orient,
-    /// Whether to return the surface variation of every point too. Default: no.
+    /// Whether to return the surface variation of every point too ([`crate::Estimate::curvature`]). Default: no.
     pub curvature: bool,
 }
 
@@ -96,9 +96,6 @@ impl Options {
             Orient::Outward => return unsupported("orient 'outward'", "'none'"),
             Orient::Viewpoint(_) => return unsupported("orient by viewpoint", "'none'"),
             Orient::Up(_) => return unsupported("orient by up direction", "'none'"),
-        }
-        if self.curvature {
-            return unsupported("curvature", "normals only");
         }
         Ok(())
     }

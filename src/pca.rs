@@ -7,6 +7,18 @@ use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 /// or in one point: 1e-6 is three times the rounding of single-precision moments, a thousandth of an edge in length.
 const LINE: f64 = 1e-6;
 
+/// The plane that fits a neighbourhood best.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Plane {
+    /// The mean of the points (paper, Eq. 5).
+    pub centroid: Vec3,
+    /// The unit normal (Eq. 6). Its sign is arbitrary but the same for the same sums.
+    pub normal: Vec3,
+    /// The surface variation `lambda3 / (lambda1 + lambda2 + lambda3)` of Pauly, Gross and Kobbelt, "Efficient
+    /// simplification of point-sampled surfaces", 2002: from 0 for points on a plane to 1/3 where no direction stands out.
+    pub variation: f32,
+}
+
 /// Ten sums over the points of a cube, relative to its centre and in units of its edge.
 ///
 /// Single precision is enough: the coordinates stay within 1.5 even after a shift, so the covariance is off by some
@@ -51,12 +63,9 @@ impl Moments {
         self.products += products + step.yxxw() * shifted.zzyw() + step.zzyw() * sums.yxxw();
     }
 
-    /// The centroid (paper, Eq. 5) and the unit normal of the plane through it (Eq. 6); `None` for fewer than three
-    /// points, and for points on one line.
-    ///
-    /// The sign of the normal is arbitrary but the same for the same sums.
+    /// The plane of the points; `None` for fewer than three, and for points on one line.
     #[inline(always)]
-    pub fn plane(&self) -> Option<(Vec3, Vec3)> {
+    pub fn plane(&self) -> Option<Plane> {
         let count = self.sums.w;
         if count < 3.0 {
             return None;
@@ -65,8 +74,11 @@ impl Moments {
         let (n, s) = (f64::from(count), self.sums.xyz().as_dvec3());
         let diagonal = n * self.squares.xyz().as_dvec3() - s * s;
         let off = n * self.products.xyz().as_dvec3() - DVec3::new(s.y * s.z, s.x * s.z, s.x * s.y);
-        let normal = Symmetric { diagonal, off }.normal(n * n)?;
-        Some(((s / n).as_vec3(), normal.as_vec3()))
+        let covariance = Symmetric { diagonal, off };
+        let smallest = covariance.smallest_eigenvalue();
+        let normal = covariance.normal(smallest, n * n)?.as_vec3();
+        let variation = (smallest / diagonal.element_sum()) as f32;
+        Some(Plane { centroid: (s / n).as_vec3(), normal, variation })
     }
 }
 
@@ -79,15 +91,14 @@ struct Symmetric {
 }
 
 impl Symmetric {
-    /// The unit eigenvector of the smallest eigenvalue, unless the second eigenvalue vanishes too, also against
+    /// The unit eigenvector of the `smallest` eigenvalue, unless the second eigenvalue vanishes too, also against
     /// `unit`, a square edge.
     ///
     /// The adjugate of `A - lambda3` has the wanted vector in each of its columns, times what its own component there
     /// says: the column with the largest diagonal is never short while the second eigenvalue stands apart.
     #[inline(always)]
-    fn normal(&self, unit: f64) -> Option<DVec3> {
+    fn normal(&self, smallest: f64, unit: f64) -> Option<DVec3> {
         let trace = self.diagonal.element_sum();
-        let smallest = self.smallest_eigenvalue();
         // lambda1 + lambda2 and lambda1 * lambda2, and from them a lower bound of lambda2 = product / lambda1.
         let sum = trace - smallest;
         let product = (self.minors() - smallest * sum).max(0.0);
@@ -158,7 +169,8 @@ mod tests {
         let many = Moments::of(corners.into_iter().cycle().take(18_000_000));
         assert_eq!(many.sums.w, 18e6);
         let (few, many) = (few.plane().unwrap(), many.plane().unwrap());
-        assert!(few.0.distance(many.0) < 1e-6 && few.1.distance(many.1) < 1e-6, "{few:?} {many:?}");
+        assert!(few.centroid.distance(many.centroid) < 1e-6, "{few:?} {many:?}");
+        assert!(few.normal.distance(many.normal) < 1e-6, "{few:?} {many:?}");
     }
 
     #[test]

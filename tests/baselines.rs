@@ -262,25 +262,41 @@ fn clouds() -> Vec<(&'static str, Vec<f32>)> {
     ]
 }
 
-/// Compares all normals of a cloud with what `judge` thinks of the point's neighbours.
+/// The surface variation of some points: 0 where there is no normal.
+fn judge_curvature(points: &[DVec3], normal: DVec3, curvature: f32) -> Result<(), String> {
+    let (_, values) = principal(points);
+    let radius = points.iter().map(|p| p.length_squared()).fold(0.0, f64::max);
+    let trace: f64 = values.iter().sum();
+    let expected = if normal == DVec3::ZERO { 0.0 } else { values[0] / trace };
+    let error = (f64::from(curvature) - expected).abs();
+    // Moments in single precision, in units of the radius; and where the eigenvalues are equal its root is found slowly.
+    let bound = if normal == DVec3::ZERO { 0.0 } else { 3e-7 * radius / trace + 2e-5 * expected };
+    if error <= bound { Ok(()) } else { Err(format!("curvature {curvature}; wanted {expected}, within {bound}")) }
+}
+
+/// Compares all normals of a cloud, and its curvature, with what judges think of the point's neighbours.
 fn compare(name: &str, points: &Points, positions: &[f32]) {
     let oracle = Oracle::of(positions);
     let lists: Vec<Vec<(usize, DVec3)>> = oracle.points.iter().map(|(_, p)| oracle.nearest(*p)).collect();
     for method in [Method::Knn, Method::Egg] {
         for k in KS {
-            let options = Options { method, k: Some(k), ..Options::default() };
+            let options = Options { method, k: Some(k), curvature: true, ..Options::default() };
             let result = run_with(points, &options);
+            let curvature = result.curvature.unwrap();
             let (mut zero, mut open, mut compared, mut worst) = (0, 0, 0, 0.0f64);
             for ((index, at), list) in oracle.points.iter().zip(&lists) {
                 let normal = DVec3::from_array([0, 1, 2].map(|c| f64::from(result.normals[3 * index + c])));
                 let only = |places: &[(usize, DVec3)]| places.iter().map(|(_, p)| *p).collect::<Vec<DVec3>>();
-                let judged = if method == Method::Knn {
-                    judge_plane(&only(&list[..list.len().min(k as usize)]), normal)
+                let (judged, neighbours) = if method == Method::Knn {
+                    let neighbours = only(&list[..list.len().min(k as usize)]);
+                    (judge_plane(&neighbours, normal), neighbours)
                 } else {
                     let others: Vec<(usize, DVec3)> = list.iter().filter(|(i, _)| i != index).copied().collect();
-                    judge_egg(&only(&others), &only(&others[..others.len().min(k as usize)]), normal)
+                    let candidates = only(&others[..others.len().min(k as usize)]);
+                    (judge_egg(&only(&others), &candidates, normal), [&candidates[..], &[DVec3::ZERO]].concat())
                 };
-                match judged {
+                let curvature = judge_curvature(&neighbours, normal, curvature[*index]);
+                match judged.and_then(|right| curvature.map(|()| right)) {
                     Ok(Right::Zero) => zero += 1,
                     Ok(Right::Open) => open += 1,
                     Ok(Right::Angle(angle)) => (compared, worst) = (compared + 1, worst.max(angle)),

@@ -132,6 +132,21 @@ fn the_report_has_every_field_of_the_contract() {
 }
 
 #[wasm_bindgen_test]
+fn curvature_comes_only_where_it_is_asked_for() {
+    let points = single(&sphere());
+    for method in ["bilinear", "knn", "egg"] {
+        let options = |asked| options(&format!(r#"{{ "method": "{method}", "curvature": {asked} }}"#));
+        let without = estimate(floats(&points), false, &options(false), &nobody()).unwrap();
+        assert!(get(&without, "curvature").is_undefined(), "{method}");
+        let with = estimate(floats(&points), false, &options(true), &nobody()).unwrap();
+        let curvature = numbers(&buffer(&with, "curvature"));
+        assert_eq!(curvature.len(), POINTS);
+        assert!(curvature.iter().all(|value| (1e-4..0.02).contains(value)), "{method}");
+        assert_eq!(normals_of(with), normals_of(without), "{method}");
+    }
+}
+
+#[wasm_bindgen_test]
 fn doubles_near_the_origin_give_what_floats_give() {
     // Exact in both, and with the median at zero: nothing is rounded.
     let points: Vec<f64> = sphere().iter().map(|number| (number * 4096.0).round() / 4096.0).collect();

@@ -28,7 +28,8 @@ fn estimate_f32(points: &[f32], options: &Options) -> Estimate {
     run_with(&Points::from_f32(points).unwrap(), options)
 }
 
-/// Length kept, every normal a unit vector or zero, on the side of the documented rule, and the report adds up.
+/// Length kept, every normal a unit vector or zero, on the side of the documented rule, and the report adds up. With
+/// curvature the normals are the same, and it lies between its bounds.
 fn check(name: &str, points: &[f32], options: &Options) -> Estimate {
     let result = estimate_f32(points, options);
     let name = format!("{name} {options:?}");
@@ -54,6 +55,15 @@ fn check(name: &str, points: &[f32], options: &Options) -> Estimate {
         assert_eq!((report.cells, report.nodes, report.grid), (0, 0, [0; 3]), "{name}");
         assert_eq!((report.cell_size, report.scale), (0.0, 0.0), "{name}");
         assert_eq!(report.nodes_used, [report.points, 0, 0, 0, 0], "{name}");
+    }
+    assert_eq!(result.curvature, None, "{name}");
+    let with_curvature = estimate_f32(points, &Options { curvature: true, ..options.clone() });
+    assert!(with_curvature.normals == result.normals, "{name}");
+    let curvature = with_curvature.curvature.unwrap();
+    assert_eq!(curvature.len(), points.len() / 3, "{name}");
+    for (value, normal) in curvature.iter().zip(result.normals.chunks_exact(3)) {
+        assert!((0.0..=1.0 / 3.0).contains(value), "{name}: {value}");
+        assert!(*value == 0.0 || normal != [0.0; 3], "{name}: {value} without a normal");
     }
     result
 }
@@ -170,6 +180,7 @@ fn the_same_bits_for_any_number_of_threads() {
     ] {
         let strayed = [points.clone(), vec![1e9, 1e9, 1e9]].concat();
         for (points, options) in [&points, &strayed].into_iter().flat_map(|p| options.iter().map(move |o| (p, o))) {
+            let options = &Options { curvature: true, ..options.clone() };
             let mut results = [1, 2, 3, 8].map(|threads| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| estimate_f32(points, options))
@@ -189,9 +200,11 @@ fn scale_and_shift_change_nothing() {
     let scaled: Vec<f32> = points.iter().map(|c| c * 1024.0).collect();
     let shifted: Vec<f32> = points.iter().map(|c| c + 16.0).collect();
     for options in [cells(&[Cell::Auto, Cell::Scale(1.0)]), baselines(&[None])].concat() {
+        let options = Options { curvature: true, ..options };
         let result = estimate_f32(&points, &options);
-        assert_eq!(estimate_f32(&scaled, &options).normals, result.normals, "{options:?}");
-        assert_eq!(estimate_f32(&shifted, &options).normals, result.normals, "{options:?}");
+        for moved in [&scaled, &shifted].map(|moved| estimate_f32(moved, &options)) {
+            assert!(moved.normals == result.normals && moved.curvature == result.curvature, "{options:?}");
+        }
     }
 }
 
@@ -321,7 +334,6 @@ fn options_out_of_range_are_refused_with_what_was_wanted() {
         Options { orient: Orient::Outward, ..Options::default() },
         Options { orient: Orient::Viewpoint([0.0; 3]), ..Options::default() },
         Options { orient: Orient::Up([0.0, 0.0, 1.0]), ..Options::default() },
-        Options { curvature: true, ..Options::default() },
     ] {
         let (unsupported, text) = text(options);
         assert!(unsupported && text.contains("not in this version"), "{text}");

@@ -3,8 +3,9 @@
 
 mod common;
 
-use bilinormal::{Cell, Options, Points, Progress, estimate};
+use bilinormal::{Cell, Method, Options, Points, Progress, estimate};
 use common::*;
+use std::f64::consts::TAU;
 
 /// The paper's own experiment: spheres at 1.0 L. It reports a mean deviation |n - n_true| below 0.0065.
 #[test]
@@ -58,6 +59,71 @@ fn planes_are_exact() {
             assert!(worst < 0.01, "{normal:?} {cell:?}: {worst} degrees");
         }
     }
+}
+
+/// The surface variation of a small disc of radius a: a^2 / 24 on the unit sphere, a^2 / 32 on a cylinder of radius 1.
+#[test]
+fn curvature_of_the_nearest_points_is_that_of_discs() {
+    const COUNT: usize = 200_000;
+    let (k, height) = (200, 4.0);
+    let mut random = Random(31);
+    let cylinder = Cloud::of((0..COUNT).map(|_| {
+        let (sin, cos) = (TAU * random.unit()).sin_cos();
+        ([cos, sin, height * (random.unit() - 0.5)], [cos, sin, 0.0])
+    }));
+    let share = f64::from(k) / COUNT as f64;
+    for (name, cloud, expected) in [
+        ("sphere", sphere(COUNT, 30), share * 4.0 / 24.0),
+        ("cylinder", cylinder, share * 2.0 * height / 32.0),
+        ("plane", plane(COUNT, 32, unit([1.0, -2.0, 3.0])), 0.0),
+    ] {
+        let options = Options { method: Method::Knn, k: Some(k), curvature: true, ..Options::default() };
+        let curvature = run_with(&Points::from_f32(&cloud.points).unwrap(), &options).curvature.unwrap();
+        let mean = curvature.iter().map(|c| f64::from(*c)).sum::<f64>() / COUNT as f64;
+        println!("{name}: mean {mean:.3e}, {expected:.3e} expected");
+        assert!((mean - expected).abs() < 0.03 * expected + 1e-7, "{name}: {mean}, {expected} expected");
+    }
+}
+
+/// That of the 27 cubes: on the unit sphere about that of a square of three edges, s^2 / 60, or more where it is slanted;
+/// nothing on faces, much at edges.
+#[test]
+fn curvature_of_cubes() {
+    let curvature = |cloud: &Cloud| {
+        let options = Options { cell: Cell::Scale(1.0), curvature: true, ..Options::default() };
+        let result = run_with(&Points::from_f32(&cloud.points).unwrap(), &options);
+        (result.curvature.unwrap(), result.report.cell_size)
+    };
+    let mean = |values: &mut dyn Iterator<Item = f32>| {
+        let (count, sum) = values.fold((0, 0.0), |(count, sum), value| (count + 1, sum + f64::from(value)));
+        sum / f64::from(count)
+    };
+    let (round, edge) = curvature(&sphere(200_000, 33));
+    let square = (3.0 * edge).powi(2) / 60.0;
+    let ratio = mean(&mut round.into_iter()) / square;
+    println!("sphere: {ratio:.2} of that of a square");
+    assert!((1.0..2.0).contains(&ratio), "{ratio}");
+
+    let (flat, _) = curvature(&plane(200_000, 34, unit([1.0, -2.0, 3.0])));
+    assert!(flat.iter().all(|value| *value < 1e-6), "{}", flat.into_iter().fold(0.0, f32::max));
+
+    // Before it is turned: how far the second largest coordinate lies from an edge.
+    let mut random = Random(35);
+    let (points, distances): (Vec<_>, Vec<_>) = (0..200_000)
+        .map(|_| {
+            let (s, t) = (random.signed(), random.signed());
+            let face = (random.unit() * 6.0) as usize;
+            let mut point = [s, t, if face < 3 { 1.0 } else { -1.0 }];
+            point.rotate_left(face % 3);
+            ((turn(point), [0.0; 3]), 1.0 - s.abs().max(t.abs()))
+        })
+        .unzip();
+    let (values, edge) = curvature(&Cloud::of(points.into_iter()));
+    let all = values.iter().copied().zip(distances);
+    let at_edges = mean(&mut all.clone().filter(|(_, d)| *d < 0.5 * edge).map(|(value, _)| value));
+    let inside = mean(&mut all.filter(|(_, d)| *d > 4.0 * edge).map(|(value, _)| value));
+    println!("cube: {at_edges:.4} at edges, {inside:.1e} inside");
+    assert!(at_edges > 0.03 && inside < 1e-6, "{at_edges} at edges, {inside} inside");
 }
 
 #[test]

@@ -10,7 +10,7 @@
 //! weigh the same; where they do not determine a surface, the plane stands in.
 
 use super::tree::{Neighbour, Place};
-use crate::pca::Moments;
+use crate::pca::{Moments, Plane};
 use glam::{DVec3, Vec3};
 
 /// How wide the ellipsoid is against its length, above 0 and up to 1. At 1 the graph is the Gabriel graph; slimmer
@@ -26,13 +26,14 @@ const COEFFICIENTS: usize = 5;
 /// How much of a column of the linear system must be left when what the columns before it tell is taken away.
 const LEAST_PIVOT: f64 = 1e-3;
 
-/// The normal at a point from its nearest neighbours, among which it may be itself; `None` if they lie on a line.
-pub(super) fn normal(
+/// The plane of a point's nearest neighbours, among which it may be itself, but with the normal of the surface through
+/// those in the graph; `None` if they lie on a line.
+pub(super) fn tangent_plane(
     places: &[Place],
     point: usize,
     nearest: &mut [Neighbour],
     edges: &mut Vec<DVec3>,
-) -> Option<Vec3> {
+) -> Option<Plane> {
     sort(nearest);
     let others = nearest.iter().map(|neighbour| neighbour.place as usize).filter(|place| *place != point);
     let relative = |place: usize| places[place].position - places[point].position;
@@ -46,9 +47,12 @@ pub(super) fn normal(
     edges.clear();
     edges.extend(others.map(|other| relative(other).as_dvec3() * scale));
     let candidates = edges.iter().map(|edge| edge.as_vec3());
-    let (_, plane) = Moments::of(candidates.chain([Vec3::ZERO])).plane()?;
+    let mut plane = Moments::of(candidates.chain([Vec3::ZERO])).plane()?;
     keep_edges(edges, ALPHA);
-    Some(quadratic(plane.as_dvec3(), edges).map_or(plane, DVec3::as_vec3))
+    if let Some(normal) = quadratic(plane.normal.as_dvec3(), edges) {
+        plane.normal = normal.as_vec3();
+    }
+    Some(plane)
 }
 
 /// Sorts by distance. By insertion: there are few, and the graph takes as many steps.

@@ -6,7 +6,7 @@ mod select;
 mod tree;
 
 use crate::error::Error;
-use crate::normals::Normals;
+use crate::normals::{Found, Normals};
 use crate::parallel;
 use crate::points::reserve;
 use crate::progress::Stage;
@@ -33,8 +33,15 @@ pub(crate) enum Baseline {
     },
 }
 
-/// The normals of `count` points, those that are not in the tree zero; also how many are not zero.
-pub(crate) fn normals(tree: &Tree, baseline: Baseline, count: usize, stage: &Stage) -> Result<(Vec<f32>, u64), Error> {
+/// The normals of `count` points, and with `curvature` the surface variation of what they come from; those that are not in
+/// the tree get zero.
+pub(crate) fn normals(
+    tree: &Tree,
+    baseline: Baseline,
+    curvature: bool,
+    count: usize,
+    stage: &Stage,
+) -> Result<Found, Error> {
     let k = match baseline {
         Baseline::Knn { k } => k,
         // The point itself is always found too.
@@ -44,7 +51,7 @@ pub(crate) fn normals(tree: &Tree, baseline: Baseline, count: usize, stage: &Sta
     // What the tasks are going to take is refused here, because they cannot.
     reserve(&mut Vec::<u8>::new(), parallel::threads() * Search::bytes(k), "the neighbours")?;
 
-    let normals = Normals::new(count, tree.places.len())?;
+    let normals = Normals::new(count, tree.places.len(), curvature)?;
     let size = (NEIGHBOURS / k.max(1)).clamp(16, 1024);
     stage.run(tree.places.len().div_ceil(size), &|task| {
         let mut search = Search::new(tree, k);
@@ -52,13 +59,14 @@ pub(crate) fn normals(tree: &Tree, baseline: Baseline, count: usize, stage: &Sta
         let mut resolved = 0;
         for place in parallel::piece(tree.places.len(), size, task) {
             let (neighbours, farthest) = search.nearest(tree.places[place].position);
-            let normal = match baseline {
-                Baseline::Knn { .. } => knn::normal(&tree.places, place, neighbours, farthest.sqrt()),
-                Baseline::Egg { .. } => egg::normal(&tree.places, place, neighbours, &mut edges),
+            let plane = match baseline {
+                Baseline::Knn { .. } => knn::plane(&tree.places, place, neighbours, farthest.sqrt()),
+                Baseline::Egg { .. } => egg::tangent_plane(&tree.places, place, neighbours, &mut edges),
             };
-            resolved += u64::from(normal.is_some());
+            resolved += u64::from(plane.is_some());
+            let (normal, variation) = plane.map_or((Vec3::ZERO, 0.0), |plane| (plane.normal, plane.variation));
             // SAFETY: a point stands in the tree once.
-            unsafe { normals.write(tree.places[place].point, normal.unwrap_or(Vec3::ZERO)) };
+            unsafe { normals.write(tree.places[place].point, normal, variation) };
         }
         normals.add_resolved(resolved);
     })?;

@@ -8,8 +8,9 @@ use wasm_bindgen::prelude::*;
 
 /// Estimates the normals of `x0 y0 z0 x1 ...`, 32-bit numbers or, if `double`, 64-bit ones. Consumes the buffer.
 ///
-/// Answers with an object of `normals`, a buffer of three 32-bit numbers for each point, and the `report`.
-#[wasm_bindgen(unchecked_return_type = "{ normals: Buffer, report: object }")]
+/// Answers with an object of `normals`, a buffer of three 32-bit numbers for each point, of `curvature`, if asked for,
+/// with one, and of the `report`.
+#[wasm_bindgen(unchecked_return_type = "{ normals: Buffer, curvature?: Buffer, report: object }")]
 pub fn estimate(
     positions: Buffer,
     double: bool,
@@ -18,7 +19,7 @@ pub fn estimate(
 ) -> Result<Object, JsValue> {
     call(tell, |progress| {
         let options = options::parse(options)?;
-        let Estimate { normals, report, .. } = if double {
+        let Estimate { normals, curvature, report } = if double {
             let points = Points::from_f64(positions.numbers("positions", 3)?)?;
             // The points are a copy: what they were copied from is not needed any more.
             drop(positions);
@@ -28,6 +29,9 @@ pub fn estimate(
         };
         let estimation = Object::new();
         set(&estimation, "normals", Buffer::from(normals));
+        if let Some(curvature) = curvature {
+            set(&estimation, "curvature", Buffer::from(curvature));
+        }
         set(&estimation, "report", describe(&report));
         Ok(estimation)
     })
