@@ -91,8 +91,12 @@ async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Plat
       const positions = put(call.positions);
       // Not kept in JavaScript memory meanwhile: 12 or 24 bytes a point.
       delete (call as Partial<typeof call>).positions;
-      const { normals, report } = glue.estimate(positions, call.double, call.options, tell);
-      return { normals: new Float32Array(take(normals)), report: { ...report, ...mode } };
+      const { normals, curvature, report } = glue.estimate(positions, call.double, call.options, tell);
+      return {
+        normals: new Float32Array(take(normals)),
+        ...(curvature && { curvature: new Float32Array(take(curvature)) }),
+        report: { ...report, ...mode },
+      };
     }
     case 'read': {
       const cloud = glue.readPly(await putFile(call.file), call.maxPoints, tellRest);

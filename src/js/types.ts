@@ -32,7 +32,7 @@ export interface EstimateOptions {
   /** How signs are chosen. Default `'none'`: deterministic, and nothing more. */
   orient?:
     'none' | 'consistent' | 'outward' | { viewpoint: [number, number, number] } | { up: [number, number, number] };
-  /** Also return the surface variation lambda3 / (lambda1 + lambda2 + lambda3), one float a point. Default false. */
+  /** Also return `curvature`, 4 bytes a point. Default false. */
   curvature?: boolean;
   /**
    * Default false: the positions are copied when the call is made. True: their buffer is handed over and detached.
@@ -48,6 +48,12 @@ export interface EstimateOptions {
 export interface EstimateResult {
   /** Unit length, or zero where a point is not finite or has no neighbours; as many numbers as `positions`. */
   normals: Float32Array;
+  /**
+   * If asked for, the surface variation lambda3 / (lambda1 + lambda2 + lambda3) (Pauly, Gross and Kobbelt 2002), one
+   * number a point: 0 where the neighbourhood is flat, up to 1/3 where it has no direction; 0 for unresolved points too.
+   * Its square root grows about as the curvature of the surface times the size of the neighbourhood: for `'bilinear'`
+   * the cubes round the point, for `'knn'` and `'egg'` the k nearest points.
+   */
   curvature?: Float32Array;
   report: Report;
 }
@@ -103,8 +109,8 @@ export interface ReadOptions {
 
 /** What a file gains: `normals` as nx ny nz, three numbers a point; `curvature` one number a point. */
 export interface Additions {
-  normals?: Float32Array;
-  curvature?: Float32Array;
+  normals?: Float32Array | undefined;
+  curvature?: Float32Array | undefined;
 }
 
 export interface WriteOptions {

@@ -12,6 +12,7 @@ export interface Buffer {
 
 export interface Estimation {
   normals: Buffer;
+  curvature?: Buffer;
   report: object;
 }
 

@@ -85,6 +85,27 @@ test('the baselines: as accurate as they should be, and a report without cubes',
   }
 });
 
+test('curvature where it is asked for: beside the same normals, within its bounds, the same bits with threads', async (context) => {
+  const positions = sphere(30000);
+  positions[3000] = NaN;
+  const [single, threads] = await Promise.all([1, 2].map((threads) => estimatorFor(context, { threads })));
+  for (const method of ['bilinear', 'knn', 'egg']) {
+    const without = await single.estimateNormals(positions, { method, curvature: false });
+    assert.ok(!('curvature' in without), method);
+    const { normals, curvature } = await single.estimateNormals(positions, { method, curvature: true });
+    assert.ok(sameBits(normals, without.normals), method);
+    assert.ok(curvature instanceof Float32Array && curvature.buffer.constructor === ArrayBuffer);
+    assert.equal(curvature.length, 30000);
+    assert.equal(curvature[1000], 0, 'an unresolved point');
+    // On a sphere about k / (6 N).
+    assert.ok(
+      curvature.every((value, i) => i === 1000 || (value > 1e-6 && value < 0.005)),
+      method,
+    );
+    assert.ok(sameBits(curvature, (await threads.estimateNormals(positions, { method, curvature: true })).curvature));
+  }
+});
+
 test('each method has its own worker: calls of both end, an abort of one leaves the other, dispose ends both', async () => {
   const estimator = await createEstimator({ threads: 1 });
   const positions = sphere(100000);

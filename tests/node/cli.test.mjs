@@ -60,6 +60,21 @@ test('the other methods, and a report without cubes', () => {
   }
 });
 
+test('--curvature adds a property, and replaces it when there is one', () => {
+  const of = (name) => propertyOf(written(name), 'vertex', 'curvature');
+  assert.equal(run(['sphere.ply', '-o', 'bent.ply', '--curvature', '--quiet']).status, 0);
+  assert.equal(of('bent.ply').type, 'float');
+  assert.equal(of('bent.ply').values.length, 20000);
+  assert.ok(of('bent.ply').values.every((value) => value > 0 && value < 0.01));
+  assert.equal(run(['bent.ply', '-o', 'again.ply', '--curvature', '--quiet', '--method', 'knn']).status, 0);
+  const { elements } = written('again.ply');
+  assert.deepEqual(
+    elements[0].properties.map(({ name }) => name),
+    written('bent.ply').elements[0].properties.map(({ name }) => name),
+  );
+  assert.notDeepEqual(of('again.ply').values, of('bent.ply').values);
+});
+
 test('--json prints the report as one line, --quiet nothing', () => {
   const { stdout } = run([
     'sphere.ply',

@@ -53,7 +53,10 @@ export async function options(positions: Positions): Promise<void> {
     wasmUrl: new URL('https://x.org'),
     memoryMaxMiB: 512,
   });
-  for (const one of all) await estimator.estimateNormals(positions, one);
+  for (const one of all) {
+    const { normals, curvature } = await estimator.estimateNormals(positions, one);
+    await estimator.writePly(new Blob(), { normals, curvature });
+  }
   const found: Features = await estimator.features();
   console.log(found.threads, found.simd, found.crossOriginIsolated, found.reason, await features());
   estimator.dispose();
