@@ -26,16 +26,17 @@ afterEach(async () => {
   assert.deepEqual(browser.surprises(), []);
 });
 
-/** Positions and normals of a PLY that the page has saved from `spherePly`. */
-function readSaved(bytes) {
+/** Positions, normals and `more` of a PLY that the page has saved from `spherePly`. */
+function readSaved(bytes, ...more) {
+  const names = ['x', 'y', 'z', 'nx', 'ny', 'nz', ...more];
   const start = bytes.indexOf('end_header\n') + 'end_header\n'.length;
   const header = bytes.toString('latin1', 0, start);
   assert.deepEqual(
     [...header.matchAll(/property (\w+ \w+)/g)].map(([, property]) => property),
-    ['x', 'y', 'z', 'nx', 'ny', 'nz'].map((name) => `float ${name}`),
+    names.map((name) => `float ${name}`),
   );
   const values = new Float32Array(bytes.buffer.slice(bytes.byteOffset + start, bytes.byteOffset + bytes.length));
-  assert.equal(values.length, 6 * Number(header.match(/element vertex (\d+)/)[1]));
+  assert.equal(values.length, names.length * Number(header.match(/element vertex (\d+)/)[1]));
   return values;
 }
 
@@ -239,6 +240,45 @@ test('another method, after a k that cannot be one', async () => {
   await page.waitForFunction(() => document.querySelector('#facts').textContent.includes('cubes'));
 });
 
+test('curvature is computed to be shown, for the normals that are there, and saved with them', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'ball.ply', spherePly(20_000));
+  const { cubes } = await result(page, 'ball.ply');
+  const choice = page.getByRole('radio', { name: 'Curvature' });
+  assert.ok(await choice.isEnabled());
+  // What is chosen but not yet computed is not for the curvature either.
+  await page.getByRole('radio', { name: '× L' }).check();
+  await page.getByRole('textbox', { name: 'multiples of L' }).fill('3');
+  await page.getByRole('radio', { name: 'Plain' }).check();
+  const plain = await colorsShown(page, { side: 300 });
+  await pressWhen('Computing normals and curvature', 'cancel');
+  await choice.check();
+  await page.waitForTimeout(500);
+  assert.deepEqual(readSaved((await save(page)).bytes).length, 6 * 20_000, 'cancelled');
+  await page.getByRole('radio', { name: 'Plain' }).check();
+  await choice.check();
+  assert.equal((await result(page, 'ball.ply')).cubes, cubes);
+  const bent = await colorsShown(page, { side: 300 });
+  assert.ok(bent > plain + 10, `colours ${bent}, plain ${plain}`);
+  const saved = readSaved((await save(page)).bytes, 'curvature');
+  for (let i = 6; i < saved.length; i += 7) assert.ok(saved[i] > 1e-6 && saved[i] < 0.01, `${saved[i]}`);
+
+  // Computed again as long as it is shown, and no longer.
+  const again = page.getByRole('button', { name: 'Re-run' });
+  await again.click();
+  await page.waitForFunction(
+    (cubes) => !document.querySelector('#facts').textContent.includes(cubes),
+    cubes.toLocaleString('en'),
+  );
+  await result(page, 'ball.ply');
+  const coarse = readSaved((await save(page)).bytes, 'curvature');
+  assert.ok(coarse[6] > 2 * saved[6], 'of larger cubes');
+  await page.getByRole('radio', { name: 'Shaded' }).check();
+  await again.click();
+  await result(page, 'ball.ply');
+  assert.equal(readSaved((await save(page)).bytes).length, 6 * 20_000);
+});
+
 test('the baselines without threads', async () => {
   page = await browser.openPage(browser.plain, { viewport: { width: 390, height: 844 } });
   await drop(page, 'ball.ply', spherePly(20_000));
@@ -260,6 +300,12 @@ test('the sample loads by its address, with colours, and can be turned', async (
   await page.getByRole('radio', { name: 'Normals' }).check();
   assert.ok((await colorsShown(page)) > 2 * front);
   await page.screenshot({ path: join(ARTEFACTS, 'sample-normals.png') });
+  await page.getByRole('radio', { name: 'Curvature' }).check();
+  await result(page, 'sample.ply');
+  assert.ok((await colorsShown(page)) > 20);
+  const cut = () => [...document.querySelectorAll('.segments')].filter((row) => row.scrollWidth > row.clientWidth);
+  assert.equal(await page.evaluate(`(${cut})().length`), 0, 'choices that are cut off');
+  await page.screenshot({ path: join(ARTEFACTS, 'sample-curvature.png') });
   await page.getByRole('radio', { name: 'Colours' }).check();
   await colorsShown(page);
   await page.screenshot({ path: join(ARTEFACTS, 'sample-colours.png') });

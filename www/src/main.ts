@@ -96,7 +96,10 @@ function takeControls(session: Session, viewer: Viewer): void {
       input.addEventListener('change', () => take(input.value));
     }
   };
-  choose('shading', (value) => store.set({ shading: value as Shading }));
+  choose('shading', (value) => {
+    store.set({ shading: value as Shading });
+    if (value === 'curvature') void session.addCurvature();
+  });
   choose('up', (value) => store.set({ up: value as Up }));
   choose('method', (value) => store.set({ method: value as Method, kText: String(METHODS[value as Method].k) }));
   choose('cell', (value) => chooseCell(store, value as CellKind));

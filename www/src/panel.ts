@@ -44,6 +44,9 @@ export function showState(store: Store): void {
     check('up', state.up);
     radio('shading', 'colors').disabled = !scan?.hasColors;
     radio('shading', 'shaded').disabled = radio('shading', 'normals').disabled = !scan?.hasNormals && !busy;
+    // To choose it starts a job, which must not end the one that runs.
+    const wait = !scan?.hasNormals || (busy && !scan.hasCurvature);
+    radio('shading', 'curvature').disabled = wait && state.shading !== 'curvature';
     element<HTMLButtonElement>('[data-do=save]').disabled = !scan?.hasNormals || busy;
 
     showOptions(state, busy);

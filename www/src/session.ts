@@ -1,8 +1,9 @@
 // What a person can have done, as one flow: file -> readPointCloud -> viewer.show -> estimateNormals ->
-// viewer.setNormals -> report. One job runs at a time; a new one cancels it.
-import { estimateNormals, readPointCloud, writePly } from 'bilinormal';
+// viewer.setNormals -> report. One job runs at a time; a new one cancels it. Curvature is computed while it is shown.
+import { estimateNormals, readPointCloud, writePly, type EstimateOptions } from 'bilinormal';
 import { boundsOf, guessUp } from './bounds';
 import { METHODS, parseOptions } from './options';
+import { colorsOf } from './ramp';
 import type { Store } from './state';
 import type { Viewer } from './viewer';
 
@@ -11,11 +12,22 @@ export interface Session {
   openSample(): Promise<void>;
   /** Computes the normals of the cloud on the screen again, with the options that are set now. */
   estimate(): Promise<void>;
+  /** Sees to it that the curvature is there, if the normals are: of the same neighbourhoods. */
+  addCurvature(): Promise<void>;
   save(): Promise<void>;
   cancel(): void;
 }
 
 const SAMPLE_POINTS = 500_000;
+
+/** The cloud on the screen, and what was computed for it. */
+interface Shown {
+  file: File;
+  positions: Float32Array;
+  result?: { normals: Float32Array; curvature?: Float32Array };
+  /** What the result was computed with. */
+  options?: EstimateOptions;
+}
 
 interface Step {
   signal: AbortSignal;
@@ -25,7 +37,7 @@ interface Step {
 
 export function createSession(store: Store, viewer: Viewer): Session {
   let current: AbortController | undefined;
-  let shown: { file: File; positions: Float32Array; normals?: Float32Array } | undefined;
+  let shown: Shown | undefined;
 
   /** Runs one job to its end; what it throws becomes the message on the page, unless it was cancelled. */
   async function run(trouble: string, work: (step: Step) => Promise<void>): Promise<void> {
@@ -65,26 +77,41 @@ export function createSession(store: Store, viewer: Viewer): Session {
     const shading = store.state.shading === 'colors' && !hasColors ? 'shaded' : store.state.shading;
     shown = { file, positions: cloud.positions };
     viewer.show(cloud, bounds, up);
-    const scan = { name: file.name, points: cloud.count, hasColors, hasNormals: false, readMilliseconds };
+    const scan = {
+      name: file.name,
+      points: cloud.count,
+      hasColors,
+      hasNormals: false,
+      hasCurvature: false,
+      readMilliseconds,
+    };
     // An edge length belongs to the unit of the file before.
     store.set({ scan, report: undefined, used: undefined, up, shading, cellKind: 'auto', cellText: '' });
   }
 
   async function shade(step: Step): Promise<void> {
-    const { scan } = store.state;
     const parsed = parseOptions(store.state);
-    if (!shown || !scan) return;
     if ('problem' in parsed) throw new Error(parsed.problem);
-    const { method = 'bilinear', k = 0 } = parsed.options;
-    const { normals, report } = await estimateNormals(shown.positions, {
-      ...parsed.options,
+    await shadeBy(parsed.options, step);
+  }
+
+  async function shadeBy(options: EstimateOptions, step: Step): Promise<void> {
+    const { scan, shading } = store.state;
+    if (!shown || !scan) return;
+    const { method = 'bilinear', k = 0 } = options;
+    const curvature = shading === 'curvature';
+    const what = `normals${curvature ? ' and curvature' : ''}${method === 'bilinear' ? '' : `, ${METHODS[method].name}`}`;
+    const { report, ...result } = await estimateNormals(shown.positions, {
+      ...options,
+      curvature,
       signal: step.signal,
-      onProgress: step.begin(`Computing normals${method === 'bilinear' ? '' : `, ${METHODS[method].name}`}`),
+      onProgress: step.begin(`Computing ${what}`),
     });
     step.signal.throwIfAborted();
-    shown.normals = normals;
-    viewer.setNormals(normals);
-    store.set({ scan: { ...scan, hasNormals: true }, report, used: { method, k } });
+    shown = { ...shown, result, options };
+    viewer.setNormals(result.normals, result.curvature && colorsOf(result.curvature));
+    const hasCurvature = result.curvature !== undefined;
+    store.set({ scan: { ...scan, hasNormals: true, hasCurvature }, report, used: { method, k } });
   }
 
   return {
@@ -103,11 +130,16 @@ export function createSession(store: Store, viewer: Viewer): Session {
 
     estimate: () => run('Computing normals', shade),
 
+    async addCurvature() {
+      const { result, options } = shown ?? {};
+      if (result && options && !result.curvature) await run('Computing curvature', (step) => shadeBy(options, step));
+    },
+
     save: () =>
       run('Saving', async (step) => {
-        if (!shown?.normals) return;
-        const { file, normals } = shown;
-        const ply = await writePly(file, { normals }, { signal: step.signal, onProgress: step.begin('Saving') });
+        if (!shown?.result) return;
+        const { file, result } = shown;
+        const ply = await writePly(file, result, { signal: step.signal, onProgress: step.begin('Saving') });
         download(ply, `${file.name.replace(/\.[^.]*$/, '')}-normals.ply`);
       }),
 

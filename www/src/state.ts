@@ -10,6 +10,7 @@ export interface Scan {
   points: number;
   hasColors: boolean;
   hasNormals: boolean;
+  hasCurvature: boolean;
   readMilliseconds: number;
 }
 

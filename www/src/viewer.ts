@@ -12,11 +12,11 @@ import {
   WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
-import { createPointMaterial, type Shading } from 'bilinormal/three';
+import { createPointMaterial, type Shading as MaterialShading } from 'bilinormal/three';
 import type { Bounds } from './bounds';
 import { pickPoint } from './pick';
 
-export type { Shading };
+export type Shading = MaterialShading | 'curvature';
 export type Up = 'y' | 'z';
 
 export interface Cloud {
@@ -29,7 +29,8 @@ export interface Cloud {
 export interface Viewer {
   /** Replaces the cloud; it stays unlit until its normals arrive. */
   show(cloud: Cloud, bounds: Bounds, up: Up): void;
-  setNormals(normals: Float32Array): void;
+  /** `curvatureColors` (RGBA) are what the shading of that name shows; without them it shows the normals. */
+  setNormals(normals: Float32Array, curvatureColors?: Uint8Array): void;
   setShading(shading: Shading): void;
   /** 1 is the size at which the points of a surface just about close it. */
   setPointSize(size: number): void;
@@ -85,6 +86,9 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   let bounds: Bounds | undefined;
   let whole = points.geometry;
   let sparse: BufferGeometry | undefined;
+  /** One of these two is the attribute `color`. */
+  let fileColors: BufferAttribute | undefined;
+  let curvatureColors: BufferAttribute | undefined;
   let shading: Shading = 'shaded';
   let pointSize = 1;
   let margins: Margins = { top: 0, right: 0, bottom: 0, left: 0 };
@@ -153,9 +157,15 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
 
   function chooseShading(): void {
     const lit = whole.hasAttribute('normal');
-    const colored = whole.hasAttribute('color');
-    const wanted = lit || shading === 'colors' || shading === 'plain' ? shading : 'colors';
-    material.shading = wanted === 'colors' && !colored ? 'plain' : wanted;
+    const bent = shading === 'curvature' && curvatureColors;
+    const colors = bent || fileColors;
+    for (const geometry of [whole, sparse]) {
+      if (colors) geometry?.setAttribute('color', colors);
+      else geometry?.deleteAttribute('color');
+    }
+    const possible = shading === 'curvature' ? (bent ? 'colors' : 'shaded') : shading;
+    const wanted = lit || possible === 'plain' ? possible : 'colors';
+    material.shading = wanted === 'colors' && !colors ? 'plain' : wanted;
   }
 
   function fit(): void {
@@ -241,7 +251,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       bounds = nextBounds;
       whole = new BufferGeometry();
       whole.setAttribute('position', new BufferAttribute(next.positions, 3));
-      if (next.colors) whole.setAttribute('color', new BufferAttribute(next.colors, 4, true));
+      fileColors = next.colors && new BufferAttribute(next.colors, 4, true);
+      curvatureColors = undefined;
       whole.boundingSphere = new Sphere(new Vector3(...bounds.centre), bounds.reach);
       sparse = undefined;
       const all = next.positions.length / 3;
@@ -258,7 +269,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       viewer.setUp(up);
       fit();
     },
-    setNormals(normals) {
+    setNormals(normals, nextCurvatureColors) {
+      curvatureColors = nextCurvatureColors && new BufferAttribute(nextCurvatureColors, 4, true);
       const before = whole.getAttribute('normal');
       if (before instanceof BufferAttribute) {
         // The same buffer on the graphics card takes the new values.
