@@ -20,7 +20,8 @@ const SIZES = [187_500, 750_000, 3_000_000];
 const CELLS = ['1.5', 'auto'];
 const SCAN = '../shared/data/scans/las_ahn3_cropped.ply.gz';
 const THREADS = availableParallelism();
-const PHASES = ['bounds', 'cellSize', 'sort', 'nodes', 'interpolation'];
+/** Of fixed cells, and of 'auto'. */
+const PHASES = ['bounds', 'cellSize', 'sort', 'nodes', 'interpolation', 'surfaces', 'vote', 'detail'];
 /** Where the clouds lie for all engines to read; below the root, so that the browser can be served from there. */
 const FOLDER = 'target/bench';
 
@@ -103,7 +104,7 @@ function row(cloud, cell, engine, reports) {
     engine.threads,
     time('total').toFixed(0),
     `±${spread.toFixed(0)} %`,
-    ...PHASES.map((phase) => time(phase).toFixed(1)),
+    ...PHASES.map((phase) => time(phase)?.toFixed(1) ?? ''),
     (points / time('total') / 1e3).toFixed(1),
     (peakBytes / points).toFixed(0),
   ];

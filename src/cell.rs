@@ -8,9 +8,9 @@ use crate::points::{Bounds, Bulk, Points};
 use crate::power::{exp2, log2};
 use glam::{DVec3, UVec3};
 
-/// Points in an occupied cube that 'auto' aims at: with the 26 cubes round it some 36 points, as accurate on clean
-/// surfaces as 30 nearest neighbours.
-const POINTS_PER_CELL: f64 = 4.0;
+/// Points in an occupied cube that 'auto' begins with: so many that a smooth surface needs few cubes, and so few that
+/// what is not smooth needs only two or three divisions.
+const POINTS_PER_CELL: f64 = 32.0;
 
 /// How many places 'auto' looks at.
 const PROBES: usize = 256;

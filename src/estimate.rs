@@ -1,13 +1,16 @@
 //! The pipeline: the only file that knows all stages.
 
+use crate::adaptive;
 use crate::baseline::{self, Baseline, Tree};
 use crate::bilinear;
 use crate::cell;
 use crate::error::Error;
 use crate::grid::Grid;
-use crate::lattice::Lattice;
+use crate::lattice::{CUBES, Lattice};
 use crate::nodes::{self, Node};
-use crate::options::{Method, Options};
+use crate::normals::Found;
+use crate::options::{Cell, Method, Options};
+use crate::pca::Moments;
 use crate::points::{Bounds, Bulk, Points};
 use crate::progress::Progress;
 
@@ -42,11 +45,25 @@ pub struct Report {
     pub cell_size: f64,
     /// Edge of a cube, in multiples of the paper's L (Eq. 1).
     pub scale: f64,
+    /// How far the points lie off the surface, in units of the input: the deviation that half of the cubes of `cell_size`
+    /// do not exceed. Only [`Cell::Auto`] measures it.
+    pub noise: Option<f64>,
+    /// The sizes of the neighbourhoods that [`Cell::Auto`] chose, the smallest first.
+    pub scales: Vec<Scale>,
     /// Points interpolated from 0, 1, 2, 3 and 4 nodes. Those from 0 took the nearest node or their own plane, or were
-    /// found by a baseline.
+    /// found without nodes.
     pub nodes_used: [u64; 5],
     /// Phases in their order, and what each took by the clock of the [`Progress`].
     pub milliseconds: Vec<(&'static str, f64)>,
+}
+
+/// Neighbourhoods of one size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    /// Edge of the cubes, in units of the input. A neighbourhood is 27 of them.
+    pub cell_size: f64,
+    /// Points whose cube rests on such a neighbourhood.
+    pub points: u64,
 }
 
 /// Estimates the normals of a cloud.
@@ -54,13 +71,14 @@ pub struct Report {
 /// Output length equals input length; a point that is not finite, or that has no neighbours to tell a plane from, gets
 /// the zero vector and influences no other. The result is the same to the bit for any number of threads.
 ///
-/// [`Method::Bilinear`] is linear in the number of points, and takes about 35 bytes a point beyond the input when cubes
-/// hold 4 points or more, up to some 130 when every point has a cube for itself. The baselines take n log n time and 30
-/// bytes a point.
+/// [`Method::Bilinear`] is linear in the number of points. Beyond the input it takes about 35 bytes a point with cubes that
+/// hold 4 points or more, up to some 130 when every point has a cube for itself; with [`Cell::Auto`] about 40, up to 85
+/// where no surface is smooth. The baselines take n log n time and 30 bytes a point.
 ///
 /// # Errors
 /// [`Error::Input`] and [`Error::Unsupported`] for the options, [`Error::Limit`] when memory does not suffice,
 /// [`Error::Cancelled`] when `progress` asked for it.
+#[optimize(size)]
 pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Result<Estimate, Error> {
     options.validate()?;
     // Places and counts are 32-bit numbers.
@@ -74,23 +92,61 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     laps.end("bounds");
 
     match options.method {
+        Method::Bilinear if options.cell == Cell::Auto => adaptive(points, options, &bounds, laps),
+        _ if !cfg!(feature = "full") => Err(Error::Unsupported("of cells only 'auto' is in this module".into())),
         Method::Bilinear => bilinear(points, options, &bounds, laps),
-        _ if !cfg!(feature = "full") => Err(Error::Unsupported("the baselines are not in this build".into())),
         Method::Knn => baseline(points, options, Baseline::Knn { k: options.k.unwrap_or(16) as usize }, &bounds, laps),
         Method::Egg => baseline(points, options, Baseline::Egg { k: options.k.unwrap_or(8) as usize }, &bounds, laps),
     }
 }
 
-/// The paper's method.
-fn bilinear(points: &Points, options: &Options, bounds: &Bounds, mut laps: Laps) -> Result<Estimate, Error> {
-    let progress = laps.progress;
-    progress.update("cellSize", 0.03)?;
-    let edge = cell::edge(options.cell, points, bounds)?;
+/// The cubes that the options ask for, at most so many along an axis.
+fn lattice(points: &Points, cell: Cell, bounds: &Bounds, most: f64, laps: &mut Laps) -> Result<Lattice, Error> {
+    laps.progress.update("cellSize", 0.03)?;
+    let edge = cell::edge(cell, points, bounds)?;
     let centre = || Bulk::of_points(points).median;
-    let lattice = Lattice::new(bounds.min.as_dvec3(), bounds.max.as_dvec3(), centre, edge);
+    let lattice = Lattice::new(bounds.min.as_dvec3(), bounds.max.as_dvec3(), centre, edge, most);
     laps.end("cellSize");
+    Ok(lattice)
+}
 
-    let (grid, moments) = Grid::sort(points, &lattice, &progress.stage("sort", 0.06..0.55))?;
+/// What both kinds of cells have to tell; the rest is left at its default.
+fn describe(points: &Points, bounds: &Bounds, lattice: &Lattice, found: &Found, laps: Laps) -> Report {
+    let edge = lattice.edge();
+    Report {
+        points: points.len() as u64,
+        unresolved: points.len() as u64 - found.resolved,
+        grid: lattice.size.as_u64vec3().to_array(),
+        cell_size: edge * points.unit,
+        scale: edge / cell::paper_edge(bounds.extent(), bounds.finite),
+        milliseconds: laps.ended,
+        ..Report::default()
+    }
+}
+
+/// Cubes of the sizes that the cloud asks for.
+fn adaptive(points: &Points, options: &Options, bounds: &Bounds, mut laps: Laps) -> Result<Estimate, Error> {
+    let lattice = lattice(points, Cell::Auto, bounds, adaptive::CUBES, &mut laps)?;
+    let middle = Bulk::of_points(points).median.as_vec3();
+    let progress = laps.progress;
+    let lap = &mut |phase| laps.end(phase);
+    let answer = adaptive::normals(points, &lattice, middle, options.curvature, progress, lap)?;
+    let mut report = describe(points, bounds, &lattice, &answer.found, laps);
+    report.cells = answer.cubes;
+    report.nodes = answer.surfaces;
+    report.noise = Some(answer.noise * report.cell_size).filter(|noise| noise.is_finite());
+    let scale = |&(edges, points): &(f64, u64)| Scale { cell_size: edges * report.cell_size, points };
+    report.scales = answer.scales.iter().map(scale).collect();
+    report.nodes_used[0] = report.points;
+    let Found { normals, curvature, .. } = answer.found;
+    Ok(Estimate { normals, curvature, report })
+}
+
+/// Cubes of one size: the paper's method.
+fn bilinear(points: &Points, options: &Options, bounds: &Bounds, mut laps: Laps) -> Result<Estimate, Error> {
+    let lattice = lattice(points, options.cell, bounds, CUBES, &mut laps)?;
+    let progress = laps.progress;
+    let (grid, moments) = Grid::sort(points, &lattice, &progress.stage("sort", 0.06..0.55), Moments::of_cube)?;
     laps.end("sort");
     let stage = progress.stage("nodes", 0.55..0.65);
     let (nodes, variations) = nodes::nodes(&grid, &moments, options.curvature, &stage)?;
@@ -100,18 +156,10 @@ fn bilinear(points: &Points, options: &Options, bounds: &Bounds, mut laps: Laps)
     let (found, nodes_used) = bilinear::interpolate(&grid, &nodes, variations.as_deref(), points.len(), &stage)?;
     laps.end("interpolation");
 
-    let paper_edge = cell::paper_edge(bounds.extent(), bounds.finite);
-    let report = Report {
-        points: points.len() as u64,
-        unresolved: points.len() as u64 - found.resolved,
-        cells: grid.cubes() as u64,
-        nodes: nodes.iter().filter(|node| Node::is_good(node)).count() as u64,
-        grid: lattice.size.as_u64vec3().to_array(),
-        cell_size: edge * points.unit,
-        scale: edge / paper_edge,
-        nodes_used,
-        milliseconds: laps.ended,
-    };
+    let mut report = describe(points, bounds, &lattice, &found, laps);
+    report.cells = grid.cubes() as u64;
+    report.nodes = nodes.iter().filter(|node| Node::is_good(node)).count() as u64;
+    report.nodes_used = nodes_used;
     Ok(Estimate { normals: found.normals, curvature: found.curvature, report })
 }
 

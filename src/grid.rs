@@ -4,7 +4,6 @@ use crate::bricks::{Bricks, OUTSIDE, set_bits};
 use crate::error::Error;
 use crate::lattice::{Lattice, cube_centre, octant_in_brick};
 use crate::parallel::{self, Filling, Scatter};
-use crate::pca::Moments;
 use crate::points::{CHUNK, Points, reserve};
 use crate::progress::Stage;
 use bytemuck::{Pod, Zeroable};
@@ -51,12 +50,25 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// Sorts the points into cubes, and finds the moments of every cube (the ten sums behind the paper's Eq. 5 and 6).
-    /// Four passes over the points, each parallel.
-    pub fn sort(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<(Self, Vec<Moments>), Error> {
-        let (bricks, keys) = Bricks::find(points, lattice, &stage.part(0.0..0.35))?;
-        let (first_point, by_brick) = sort_by_brick(points, lattice, &bricks, keys, &stage.part(0.35..0.75))?;
-        let (placed, masks) = sort_by_cube(&by_brick, &first_point, &stage.part(0.75..0.9))?;
+    /// Sorts the points into cubes, and asks `of_cube` for something about every cube, from its points and its centre in
+    /// the brick. Four passes over the points, each parallel.
+    pub fn sort<T: Copy + Send>(
+        points: &Points,
+        lattice: &Lattice,
+        stage: &Stage,
+        of_cube: impl Fn(&[Placed], Vec3) -> T + Sync,
+    ) -> Result<(Self, Vec<T>), Error> {
+        let mut grid = Self::sort_points(points, lattice, &stage.part(0.0..0.9))?;
+        let answers = grid.find_cubes(&stage.part(0.9..1.0), of_cube)?;
+        Ok((grid, answers))
+    }
+
+    /// All but the ends of the cubes.
+    #[optimize(size)]
+    fn sort_points(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<Self, Error> {
+        let (bricks, keys) = Bricks::find(points, lattice, &stage.part(0.0..0.4))?;
+        let (first_point, by_brick) = sort_by_brick(points, lattice, &bricks, keys, &stage.part(0.4..0.8))?;
+        let (placed, masks) = sort_by_cube(&by_brick, &first_point, &stage.part(0.8..1.0))?;
         drop(by_brick);
 
         let mut first_cube = Vec::new();
@@ -68,9 +80,7 @@ impl Grid {
             first_cube.push(total);
         }
         let blocks = blocks(&first_point);
-        let mut grid = Self { bricks, masks, first_cube, first_point, cube_end: Vec::new(), placed, blocks };
-        let moments = grid.sum(total as usize, &stage.part(0.9..1.0))?;
-        Ok((grid, moments))
+        Ok(Self { bricks, masks, first_cube, first_point, cube_end: Vec::new(), placed, blocks })
     }
 
     /// How many cubes hold points.
@@ -78,9 +88,28 @@ impl Grid {
         self.cube_end.len()
     }
 
-    /// Sums up every cube, and notes where its points end.
-    fn sum(&mut self, cubes: usize, stage: &Stage) -> Result<Vec<Moments>, Error> {
-        let (sums, ends) = (Filling::new(cubes, "the cubes")?, Filling::new(cubes, "the cubes")?);
+    /// Calls `work(brick, cube, its bit in the mask)` for every cube, in parallel.
+    pub fn each_cube(&self, stage: &Stage, work: &(dyn Fn(usize, usize, u32) + Sync)) -> Result<(), Error> {
+        stage
+            .run(self.blocks.len(), &|block| self.cubes_in(block).for_each(|(brick, cube, bit)| work(brick, cube, bit)))
+    }
+
+    /// The cubes of a block: the brick, the cube, and its bit in the mask.
+    pub fn cubes_in(&self, block: usize) -> impl Iterator<Item = (usize, usize, u32)> {
+        self.blocks[block].clone().flat_map(|brick| {
+            let first = self.first_cube[brick] as usize;
+            set_bits(self.masks[brick]).zip(first..).map(move |(bit, cube)| (brick, cube, bit))
+        })
+    }
+
+    /// Notes where the points of each cube end, and asks `of_cube` while they are at hand.
+    fn find_cubes<T: Copy + Send>(
+        &mut self,
+        stage: &Stage,
+        of_cube: impl Fn(&[Placed], Vec3) -> T + Sync,
+    ) -> Result<Vec<T>, Error> {
+        let cubes = self.first_cube[self.masks.len()] as usize;
+        let (answers, ends) = (Filling::new(cubes, "the cubes")?, Filling::new(cubes, "the cubes")?);
         let (placed, first_point, first_cube) = (&self.placed, &self.first_point, &self.first_cube);
         let (masks, blocks) = (&self.masks, &self.blocks);
         stage.run(blocks.len(), &|block| {
@@ -100,7 +129,7 @@ impl Grid {
                     start += length;
                     // SAFETY: a cube belongs to one brick, and a brick to one block.
                     unsafe {
-                        sums.write(cube, Moments::of(points[..length].iter().map(|point| point.local - centre)));
+                        answers.write(cube, of_cube(&points[..length], centre));
                         ends.write(cube, start as u32);
                     }
                 }
@@ -109,7 +138,7 @@ impl Grid {
         // SAFETY: the blocks hold all bricks, and these all cubes.
         unsafe {
             self.cube_end = ends.complete();
-            Ok(sums.complete())
+            Ok(answers.complete())
         }
     }
 
@@ -126,6 +155,7 @@ impl Grid {
 }
 
 /// Sorts the points by brick: a counting sort, stable, so its result does not depend on how the input is cut.
+#[optimize(size)]
 fn sort_by_brick(
     points: &Points,
     lattice: &Lattice,

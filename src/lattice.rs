@@ -6,7 +6,7 @@ use glam::{DVec3, IVec3, UVec3, Vec3, Vec4, Vec4Swizzles};
 pub(crate) const BRICK: i32 = 4;
 
 /// Cubes along an axis at the most: places must fit 32-bit numbers.
-const CUBES: f64 = (1 << 30) as f64;
+pub(crate) const CUBES: f64 = (1 << 30) as f64;
 
 /// An endless grid of cubes, grouped in bricks of 4x4x4.
 #[derive(Clone, Copy, Debug)]
@@ -20,15 +20,40 @@ pub(crate) struct Lattice {
 }
 
 impl Lattice {
-    /// A grid from `min` to `max`. Where that is more than 2^30 cubes along an axis, 2^29 on either side of `centre()`:
-    /// points beyond are out of reach.
-    pub fn new(min: DVec3, max: DVec3, centre: impl FnOnce() -> DVec3, edge: f64) -> Self {
+    /// A grid from `min` to `max`. Where that is more than `most` cubes along an axis, half of `most` on either side of
+    /// `centre()`: points beyond are out of reach.
+    pub fn new(min: DVec3, max: DVec3, centre: impl FnOnce() -> DVec3, edge: f64, most: f64) -> Self {
         let scale = 1.0 / edge;
-        let is_long = ((max - min) * scale).cmpge(DVec3::splat(CUBES)).any();
-        let base = if is_long { min.max(centre() - CUBES / 2.0 * edge) } else { min };
+        let is_long = ((max - min) * scale).cmpge(DVec3::splat(most)).any();
+        let base = if is_long { min.max(centre() - most / 2.0 * edge) } else { min };
         // The same product as in `locate`, so that the point on the maximum falls into the last cube.
-        let size = (((max - base) * scale).floor() + 1.0).clamp(DVec3::ONE, DVec3::splat(CUBES));
+        let size = (((max - base) * scale).floor() + 1.0).clamp(DVec3::ONE, DVec3::splat(most));
         Self { base, scale, size }
+    }
+
+    /// The same cubes, for positions in edges from the lowest corner of brick `origin`.
+    pub fn in_edges(&self, origin: IVec3) -> Self {
+        Self { base: f64::from(-BRICK) * origin.as_dvec3(), scale: 1.0, size: self.size }
+    }
+
+    /// Cubes of twice the edge, eight of these in each.
+    pub fn coarser(&self) -> Self {
+        Self { base: self.base, scale: 0.5 * self.scale, size: (0.5 * self.size).ceil() }
+    }
+
+    /// Cubes of half the edge; there must be places for twice as many.
+    pub fn finer(&self) -> Self {
+        Self { base: self.base, scale: 2.0 * self.scale, size: 2.0 * self.size }
+    }
+
+    /// The point at a place in a brick.
+    pub fn position(&self, brick: IVec3, local: Vec3) -> Vec3 {
+        (self.base + (f64::from(BRICK) * brick.as_dvec3() + local.as_dvec3()) / self.scale).as_vec3()
+    }
+
+    /// The edge of a cube.
+    pub fn edge(&self) -> f64 {
+        1.0 / self.scale
     }
 
     /// Bricks along each axis.

@@ -1,14 +1,19 @@
 //! Normals of large scattered point clouds, in time linear in the number of points.
 //!
-//! The method is bilinear interpolation between nodes on a grid of cubes, after "An Investigation of the High
-//! Efficiency Estimation Approach of the Large-Scale Scattered Point Cloud Normal Vector" ("the paper").
+//! With [`Cell::Auto`], the default, a normal comes from curved surfaces through neighbourhoods of the size that noise and
+//! detail allow (docs/adaptive.md). With cubes of one size the method is bilinear interpolation between nodes on their
+//! grid, after "An Investigation of the High Efficiency Estimation Approach of the Large-Scale Scattered Point Cloud
+//! Normal Vector" ("the paper").
 //!
 //! ```text
-//! file bytes -> points -> grid -> nodes -> normals
-//!     ply       points    grid    nodes    normals
+//! file bytes -> points -> grid -> nodes or surfaces -> normals
+//!     ply       points    grid    nodes, adaptive      normals
 //! ```
 #![warn(missing_docs)]
+// What runs once in a call is compiled for size: the modules that browsers download must stay small.
+#![feature(optimize_attribute)]
 
+mod adaptive;
 mod baseline;
 mod bilinear;
 mod bricks;
@@ -32,7 +37,7 @@ mod surroundings;
 pub mod wasm;
 
 pub use error::{Error, Place};
-pub use estimate::{Estimate, Report, estimate};
+pub use estimate::{Estimate, Report, Scale, estimate};
 pub use options::{Cell, Method, Options, Orient};
 pub use points::Points;
 pub use progress::Progress;

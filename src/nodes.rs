@@ -91,7 +91,7 @@ pub(crate) fn nodes(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lattice::Lattice;
+    use crate::lattice::{CUBES, Lattice};
     use crate::points::Points;
     use crate::progress::Progress;
     use glam::{DMat3, DVec3, IVec3};
@@ -114,10 +114,10 @@ mod tests {
         let points = Points::from_f32(bytemuck::cast_slice(&positions)).unwrap();
         let (min, max) = (DVec3::ZERO, DVec3::new(1.0, 3.0, 1.0));
         for edge in [0.03, 0.11, 0.25] {
-            let lattice = Lattice::new(min, max, || min, edge);
+            let lattice = Lattice::new(min, max, || min, edge, CUBES);
             let progress = Progress::silent();
             let stage = progress.stage("test", 0.0..1.0);
-            let (grid, moments) = Grid::sort(&points, &lattice, &stage).unwrap();
+            let (grid, moments) = Grid::sort(&points, &lattice, &stage, Moments::of_cube).unwrap();
             let (nodes, variations) = nodes(&grid, &moments, true, &stage).unwrap();
             let mut variations = variations.unwrap().into_iter();
 

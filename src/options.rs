@@ -8,7 +8,7 @@ use crate::number::text;
 pub struct Options {
     /// How a normal is found. Default: [`Method::Bilinear`].
     pub method: Method,
-    /// Edge of the cubes. Default: [`Cell::Auto`]. The baselines have no cubes.
+    /// Size of the cubes. Default: [`Cell::Auto`]. The baselines have no cubes.
     pub cell: Cell,
     /// How many nearest points the baselines look at, at least 3; if there are fewer, all. Default: 16 for
     /// [`Method::Knn`], the point itself among them; 8 others for [`Method::Egg`].
@@ -42,7 +42,8 @@ pub enum Method {
 /// occupied cube: about 4 suit clean scans, 15 to 60 noisy ones.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum Cell {
-    /// The edge that puts about 4 points into an occupied cube, found from the data; stray points do not change it.
+    /// Every place takes the size that its noise and its detail allow: nothing to choose (docs/adaptive.md). Stray points
+    /// change nothing.
     #[default]
     Auto,
     /// Multiples of the paper's L (Eq. 1), 0.1 to 100; the paper advises 1.0 to 1.5. L is defined by the bounding box:

@@ -1,5 +1,6 @@
 //! One neighbourhood: its moments, their shift by whole cubes, and the plane that fits it best.
 
+use crate::grid::Placed;
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 
@@ -52,6 +53,11 @@ impl Moments {
         }
     }
 
+    /// The sums of a cube, against its centre.
+    pub fn of_cube(points: &[Placed], centre: Vec3) -> Self {
+        Self::of(points.iter().map(|point| point.local - centre))
+    }
+
     /// Adds the sums of the cube that lies `step` cubes away, shifted into this cube's coordinates. The last of the four
     /// lanes of `step` is zero.
     #[inline(always)]
@@ -83,11 +89,11 @@ impl Moments {
 }
 
 /// A symmetric 3x3 matrix, positive semidefinite up to rounding.
-struct Symmetric {
+pub(crate) struct Symmetric {
     /// xx, yy, zz.
-    diagonal: DVec3,
+    pub diagonal: DVec3,
     /// yz, xz, xy.
-    off: DVec3,
+    pub off: DVec3,
 }
 
 impl Symmetric {
@@ -97,7 +103,7 @@ impl Symmetric {
     /// The adjugate of `A - lambda3` has the wanted vector in each of its columns, times what its own component there
     /// says: the column with the largest diagonal is never short while the second eigenvalue stands apart.
     #[inline(always)]
-    fn normal(&self, smallest: f64, unit: f64) -> Option<DVec3> {
+    pub fn normal(&self, smallest: f64, unit: f64) -> Option<DVec3> {
         let trace = self.diagonal.element_sum();
         // lambda1 + lambda2 and lambda1 * lambda2, and from them a lower bound of lambda2 = product / lambda1.
         let sum = trace - smallest;
@@ -135,7 +141,7 @@ impl Symmetric {
     /// Each cubes the error: planar neighbourhoods take two. The bound serves nearly isotropic ones, whose normal means
     /// little. No trigonometry: the same bits on every platform.
     #[inline(always)]
-    fn smallest_eigenvalue(&self) -> f64 {
+    pub fn smallest_eigenvalue(&self) -> f64 {
         let (trace, minors, determinant) = (self.diagonal.element_sum(), self.minors(), self.determinant());
         // A step this small against lambda2 leaves an error far below rounding.
         let last = 1e-5 * minors / trace;

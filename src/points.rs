@@ -167,6 +167,7 @@ impl Bulk {
     }
 
     /// Looks at `at(0) .. at(count - 1)`, at most a few thousand of them; non-finite points are passed over.
+    #[optimize(size)]
     pub fn of(count: usize, at: &dyn Fn(usize) -> DVec3) -> Self {
         let step = count.div_ceil(SAMPLE).max(1);
         // A different place in each stride, so that the rows of a scan do not fall in step with the sample.

@@ -54,6 +54,12 @@ fn milliseconds() -> f64 {
     PERFORMANCE.with(Performance::now)
 }
 
+/// A number for a message.
+pub(crate) fn text(value: f64) -> String {
+    // Radix 10 is never refused.
+    js_sys::Number::from(value).to_string_with_radix(10).map(String::from).unwrap_or_default()
+}
+
 /// Sets a property of an object that this module has just made, which cannot fail.
 fn set(object: &Object, name: &str, value: impl Into<JsValue>) {
     let _ = Reflect::set(object, &name.into(), &value.into());

@@ -265,7 +265,7 @@ fn a_stray_point_a_million_extents_away_changes_nothing_noticeable() {
     for stray in [[2e6, 2e6, 2e6], [-2e6, 0.0, 0.0], [-1e30, 1e30, 0.0]] {
         let points = [cloud.points.clone(), stray.to_vec()].concat();
         let (with, without) = (run(&points, Cell::Auto), run(&cloud.points, Cell::Auto));
-        assert!((with.report.cell_size / without.report.cell_size - 1.0).abs() < 0.05);
+        assert!((with.report.cell_size / without.report.cell_size - 1.0).abs() < 0.1);
         let error = |normals: &[f32]| root_mean_square(&angles(normals, &cloud.normals));
         let (a, b) = (error(&with.normals[..150_000]), error(&without.normals));
         assert!((a / b - 1.0).abs() < 0.1, "{stray:?}: {a} against {b} degrees");
@@ -275,8 +275,12 @@ fn a_stray_point_a_million_extents_away_changes_nothing_noticeable() {
 
 #[test]
 fn progress_rises_from_0_to_1_and_can_stop_the_call_anywhere() {
-    let phases = ["bounds", "cellSize", "sort", "nodes", "interpolation"];
-    hear_and_stop(&sphere(600_000, 16), &Options::default(), &phases);
+    let cloud = sphere(600_000, 16);
+    let fixed = Options { cell: Cell::Scale(0.5), ..Options::default() };
+    hear_and_stop(&cloud, &fixed, &["bounds", "cellSize", "sort", "nodes", "interpolation"]);
+    let phases = ["bounds", "cellSize", "sort", "surfaces", "vote", "detail"];
+    hear_and_stop(&cloud, &Options::default(), &phases);
+    hear_and_stop(&cube(100_000, 16), &Options::default(), &phases);
     for options in baselines(&[None]) {
         hear_and_stop(&sphere(200_000, 16), &options, &["bounds", "tree", "normals"]);
     }

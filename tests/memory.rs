@@ -35,7 +35,9 @@ static ALLOCATOR: Counting = Counting;
 fn peak_bytes_a_point() {
     let sphere = sphere(1_000_000, 1).points;
     let stray = |far: f32| [sphere.clone(), vec![far, far, far]].concat();
+    // In a solid no surface fits: every cube is divided as far as it goes.
     let mut random = Random(2);
+    let noisy: Vec<f32> = (0..3_000_000).map(|_| random.signed() as f32).collect();
     let needle: Vec<f32> = (0..3_000_000)
         .map(|i| if i % 3 == 0 { 1e6 * random.signed() as f32 } else { random.signed() as f32 })
         .collect();
@@ -46,6 +48,7 @@ fn peak_bytes_a_point() {
         ("sphere, auto", &sphere, Cell::Auto, 52),
         ("a stray point", &stray(3e6), Cell::Auto, 52),
         ("a stray point beyond all cubes", &stray(-1e30), Cell::Auto, 52),
+        ("rough everywhere", &noisy, Cell::Auto, 105),
         ("a needle", &needle, Cell::Scale(1.0), 90),
         ("as many cubes as points", &sphere, Cell::Scale(0.1), 110),
         ("far more cubes than points", &sphere, Cell::Size(1e-6), 150),

@@ -241,7 +241,7 @@ function surface({ freeForm }, pictures) {
       `here, ${label(variant)}`,
       ...(isOurs ? [cubes(method.grid), count(method.cells), percent(1 - method.cells / points)] : ['', '', '']),
       milliseconds(method.module),
-      ...(isOurs ? [milliseconds(method.phases.interpolation), rest(method)] : ['', '']),
+      ...(method.phases.interpolation ? [milliseconds(method.phases.interpolation), rest(method)] : ['', '']),
       ratio(methods.knn.module / method.module),
       error(found.mean),
       error(found.median),

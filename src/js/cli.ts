@@ -16,7 +16,7 @@ is kept, existing normals are replaced. IN may be - for standard input.
 
   -o, --out FILE         where the result goes; it appears there when it is complete, so IN itself is allowed
       --method NAME      bilinear (default), knn or egg
-      --cell auto        edge of the cubes from the data (default)
+      --cell auto        the size that noise and detail allow, place by place (default)
       --cell-scale S     ... in multiples of cbrt(volume / points), 0.1 to 100; larger averages more noise away
       --cell-size L      ... in the units of the file
       --k N              nearest points of knn (default 16), candidates of egg (default 8); at least 3
@@ -257,16 +257,23 @@ function format(report: Report, { method = 'bilinear' }: EstimateOptions): strin
   const { total, ...phases } = report.milliseconds;
   const count = (value: number) => value.toLocaleString('en');
   const short = (value: number) => String(Number(value.toPrecision(4)));
-  const cubes = [
+  const fixed = [
     ['cubes', `${count(report.cells)} of ${report.grid.map(count).join(' x ')}, ${count(report.nodes)} with a node`],
     ['cube edge', `${short(report.cellSize)} (${short(report.scale)} L)`],
     ['nodes used', report.nodesUsed.map((points, nodes) => `${nodes}: ${count(points)}`).join('   ')],
+  ];
+  const { noise, scales } = report;
+  const share = (points: number) => `${short((100 * points) / report.points)} %`;
+  const adaptive = noise !== undefined && [
+    ['cubes', count(report.cells)],
+    ['cube edges', scales?.map(({ cellSize, points }) => `${short(cellSize)}: ${share(points)}`).join('   ') ?? ''],
+    ['noise', short(noise)],
   ];
   const rows = [
     ['points', count(report.points) + (report.unresolved ? `, ${count(report.unresolved)} without a normal` : '')],
     ['method', method],
     // The others have none.
-    ...(method === 'bilinear' ? cubes : []),
+    ...(method === 'bilinear' ? adaptive || fixed : []),
     ['threads', report.threads + (report.fallbackReason ? ` (${report.fallbackReason})` : '')],
     ['memory', `${short(report.peakBytes / 2 ** 20)} MiB at most`],
     [

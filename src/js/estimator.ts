@@ -180,7 +180,7 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
   const full = openQueue(host, { ...options, full: true });
   const estimator: Estimator = {
     estimateNormals: (positions, options = {}) =>
-      (/knn|egg/.test(options?.method!) ? full : core).run(options, () => {
+      (/knn|egg/.test(options?.method!) || typeof options?.cell === 'object' ? full : core).run(options, () => {
         const kind = kindOf(positions);
         want(/^Float(32|64)Array$/.test(kind), 'positions', positions, 'a Float32Array or Float64Array');
         const { length } = positions;

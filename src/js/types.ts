@@ -20,8 +20,10 @@ export interface EstimateOptions {
    */
   method?: 'bilinear' | 'knn' | 'egg';
   /**
-   * Edge of the cubes of `'bilinear'`, default `'auto'`. `scale`: multiples of the paper's L (Eq. 1), 0.1 to 100; `size`: in the units
-   * of the input. Small cubes follow detail, large ones average noise away.
+   * Size of the cubes of `'bilinear'`. Default `'auto'`: every place takes the size that its noise and its detail allow, and
+   * edges stay sharp. With one size for all the method is exactly the paper's: `scale`, the edge in multiples of the
+   * paper's L (Eq. 1), 0.1 to 100; `size`, in the units of the input. Small cubes follow detail, large ones average noise
+   * away.
    */
   cell?: 'auto' | { scale: number } | { size: number };
   /**
@@ -64,15 +66,25 @@ export interface Report {
   unresolved: number;
   /** Occupied cubes. This and all about cubes and nodes is 0 for the baselines, which have none. */
   cells: number;
-  /** Cubes with a valid node. */
+  /** Cubes with a valid node; with `cell: 'auto'`, with a surface. */
   nodes: number;
   /** Cubes along each axis. */
   grid: [number, number, number];
-  /** Edge of the cubes in the units of the input. */
+  /** Edge of the cubes in the units of the input; with `cell: 'auto'`, of those that it begins with. */
   cellSize: number;
   /** Edge of the cubes in multiples of the paper's L. */
   scale: number;
-  /** Points interpolated from 0, 1, 2, 3 and 4 nodes; all from 0 for the baselines. */
+  /**
+   * How far the points lie off the surface, in the units of the input: the deviation that half of the cubes of `cellSize`
+   * do not exceed. Only with `cell: 'auto'`.
+   */
+  noise?: number;
+  /**
+   * The sizes of the neighbourhoods that `cell: 'auto'` chose, the smallest first, and how many points took each. A
+   * neighbourhood is 27 cubes of edge `cellSize`.
+   */
+  scales?: { cellSize: number; points: number }[];
+  /** Points interpolated from 0, 1, 2, 3 and 4 nodes; all from 0 for the baselines and with `cell: 'auto'`. */
   nodesUsed: [number, number, number, number, number];
   /**
    * Each phase in the wasm module, and `total`: from the moment the call left the queue to its result in the calling

@@ -103,6 +103,7 @@ fn decimal_length(digits: u64) -> i64 {
 /// The same for any number: the digits that its distance from its neighbours asks for (Steele and White).
 #[cold]
 #[inline(never)]
+#[optimize(size)]
 fn long_digits(value: f64, precision: Precision) -> (u64, i64) {
     let bits = value.to_bits();
     // Mantissa and exponent in the number's own precision, which is at most that of a double.

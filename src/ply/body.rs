@@ -62,6 +62,7 @@ impl<'a> Part<'a> {
 impl<'a> Body<'a> {
     /// Finds the elements. Costs one step for an element of fixed rows, one for every list in the others, and a pass over
     /// text; takes no memory for rows.
+    #[optimize(size)]
     pub fn locate(header: &'a Header<'a>, file: &'a [u8]) -> Result<Self, Error> {
         let mut body = Self { header, file, starts: Vec::new(), pieces: Vec::new() };
         if Cursor::new(file, 0, header.format).is_text() {

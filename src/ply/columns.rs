@@ -45,6 +45,7 @@ pub(super) const NAMES: [(Target, &[&str]); 10] = [
 ];
 
 /// The properties of `vertex` that are read, positions first; none without all of x y z as plain numbers.
+#[optimize(size)]
 pub(super) fn find(vertex: &Element) -> Result<Option<Vec<Column>>, Error> {
     let mut columns: Vec<Column> = Vec::new();
     for (target, names) in NAMES {
@@ -117,6 +118,7 @@ pub(super) struct Arrays {
 
 impl Arrays {
     /// Takes memory for `count` points.
+    #[optimize(size)]
     pub fn new(columns: &[Column], count: usize) -> Result<Self, Error> {
         let floats = |target, width: usize| {
             let mut items = Vec::new();

@@ -236,6 +236,7 @@ impl<'a> Cursor<'a> {
 
 /// Numbers that are none, in the spellings of C libraries old and new: `-nan(ind)`, `1.#QNAN`, `-1.#INF`.
 #[cold]
+#[optimize(size)]
 fn non_finite(token: &[u8]) -> Option<f64> {
     let (negative, word) = match token {
         [b'-', word @ ..] => (true, word),

@@ -78,6 +78,7 @@ impl Element<'_> {
 
 impl<'a> Header<'a> {
     /// Reads the header at the beginning of `file`; the body is not looked at.
+    #[optimize(size)]
     pub fn parse(file: &'a [u8]) -> Result<Self, Error> {
         let start = if file.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
         let magic = file.get(start..start + 3).is_some_and(|word| word.eq_ignore_ascii_case(b"ply"));

@@ -31,6 +31,7 @@ const SAMPLE: usize = 4096;
 ///
 /// Errors: [`Error::Format`] with the line or byte for a file that is not right or not PLY, [`Error::Input`] for more
 /// points than `max_points`, [`Error::Limit`] for too little memory, [`Error::Cancelled`].
+#[optimize(size)]
 pub fn read(file: &[u8], options: &ReadOptions, progress: &Progress) -> Result<PointCloud, Error> {
     progress.update("read", 0.0)?;
     let header = Header::parse(file)?;

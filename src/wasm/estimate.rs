@@ -37,6 +37,8 @@ pub fn estimate(
     })
 }
 
+#[optimize(size)]
+#[inline(never)]
 fn describe(report: &Report) -> Object {
     let object = Object::new();
     set(&object, "points", report.points as f64);
@@ -46,6 +48,17 @@ fn describe(report: &Report) -> Object {
     set(&object, "grid", array(&report.grid));
     set(&object, "cellSize", report.cell_size);
     set(&object, "scale", report.scale);
+    if let Some(noise) = report.noise {
+        set(&object, "noise", noise);
+        let scales = Array::new();
+        for scale in &report.scales {
+            let object = Object::new();
+            set(&object, "cellSize", scale.cell_size);
+            set(&object, "points", scale.points as f64);
+            scales.push(&object);
+        }
+        set(&object, "scales", scales);
+    }
     set(&object, "nodesUsed", array(&report.nodes_used));
     let milliseconds = Object::new();
     for &(phase, time) in &report.milliseconds {

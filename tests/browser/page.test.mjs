@@ -65,7 +65,7 @@ test('a dropped scan gets its normals by threads and is shaded', async () => {
   assert.match(shown.headline, /^[\d.]+ m?s for 60,000 points$/);
   assert.equal(shown.mode, 'threads');
   assert.equal(shown.fallback, undefined);
-  assert.ok(shown.cubes > 5_000 && shown.nodes > 5_000 && shown.nodes <= shown.cubes, JSON.stringify(shown));
+  assert.ok(shown.cubes > 1_000 && shown.edge > 0 && shown.noise < 0.01 * shown.edge, JSON.stringify(shown));
   assert.equal(shown.unresolved, 0);
   assert.ok(shown.phases.length > 2 && shown.phases.includes('reading the file'), String(shown.phases));
 

@@ -109,6 +109,14 @@ function showJob({ job }: State): void {
 /** What the method tells of itself. */
 function factsOf(report: Report, used: State['used']): HTMLElement[] {
   if (used && used.method !== 'bilinear') return [fact(METHODS[used.method].name, `k = ${count(used.k)}`)];
+  if (report.noise !== undefined && report.scales?.length) {
+    const edges = [report.scales[0]!, report.scales.at(-1)!].map(({ cellSize }) => measure(cellSize));
+    return [
+      fact(count(report.cells), 'cubes'),
+      fact(edges[0] === edges[1] ? edges[0]! : edges.join(' to '), 'edge'),
+      fact(measure(report.noise), 'noise'),
+    ];
+  }
   return [
     fact(count(report.cells), 'cubes'),
     fact(count(report.nodes), 'nodes'),

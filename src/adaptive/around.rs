@@ -1,0 +1,116 @@
+//! The cubes in and two deep round a brick.
+
+use crate::bricks::set_bits;
+use crate::grid::Grid;
+use crate::surroundings::STEPS;
+use glam::{IVec3, UVec3, Vec3};
+
+/// 8x8x8 places: `x + 8 y + 64 z`, the brick's first cube at (2, 2, 2).
+pub(super) struct Around {
+    /// A bit for each place that is occupied, a word for each z.
+    occupied: [u64; 8],
+    cubes: [u32; 512],
+    brick: usize,
+}
+
+impl Around {
+    pub fn new() -> Self {
+        Self { occupied: [0; 8], cubes: [0; 512], brick: usize::MAX }
+    }
+
+    /// Looks up the 27 bricks around and in place of brick `brick`.
+    #[inline(never)]
+    #[optimize(size)]
+    fn look(&mut self, grid: &Grid, brick: usize) {
+        self.brick = brick;
+        self.occupied = [0; 8];
+        for step in STEPS {
+            let number = if step == IVec3::ZERO {
+                Some(brick as u32)
+            } else {
+                grid.bricks.number(grid.bricks.places[brick] + step)
+            };
+            let Some(number) = number else { continue };
+            let (mask, first) = (grid.masks[number as usize], grid.first_cube[number as usize]);
+            let shift = 4 * (step.x + 8 * step.y + 64 * step.z);
+            for bit in set_bits(mask & facing(step)) {
+                let before = (mask & ((1 << bit) - 1)).count_ones();
+                let place = Self::place(bit).wrapping_add_signed(shift as isize);
+                self.occupied[place / 64] |= 1 << (place % 64);
+                self.cubes[place] = first + before;
+            }
+        }
+    }
+
+    /// Lists the occupied cubes at most `reach` (1 or 2) away from the cube with bit `bit` of a brick: what lies between
+    /// the two, in edges, and the number of the other. In the order of their places.
+    pub fn near(&mut self, grid: &Grid, brick: usize, bit: u32, reach: u32, list: &mut Vec<(Vec3, usize)>) {
+        if self.brick != brick {
+            self.look(grid, brick);
+        }
+        list.clear();
+        let corner = UVec3::new(bit & 3, bit >> 2 & 3, bit >> 4) + 2 - reach;
+        let shift = corner.x + 8 * corner.y;
+        let rows: u64 = if reach == 1 { 0x0007_0707 } else { 0x001F_1F1F_1F1F };
+        for z in 0..=2 * reach {
+            let first = 64 * (corner.z + z);
+            for near in set_bits(self.occupied[first as usize / 64] >> shift & rows) {
+                let step = UVec3::new(near & 7, near >> 3, z).as_vec3() - reach as f32;
+                list.push((step, self.cubes[(first + shift + near) as usize] as usize));
+            }
+        }
+    }
+
+    fn place(bit: u32) -> usize {
+        (146 + (bit & 3) + 8 * (bit >> 2 & 3) + 64 * (bit >> 4)) as usize
+    }
+}
+
+/// The cubes of the brick `step` away that are at most two away from this brick.
+fn facing(step: IVec3) -> u64 {
+    const X: [u64; 3] = [0xCCCC_CCCC_CCCC_CCCC, u64::MAX, 0x3333_3333_3333_3333];
+    const Y: [u64; 3] = [0xFF00_FF00_FF00_FF00, u64::MAX, 0x00FF_00FF_00FF_00FF];
+    const Z: [u64; 3] = [0xFFFF_FFFF_0000_0000, u64::MAX, 0x0000_0000_FFFF_FFFF];
+    let [x, y, z] = (step + 1).to_array().map(|i| i as usize);
+    X[x] & Y[y] & Z[z]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lattice::{CUBES, Lattice, cube_centre};
+    use crate::points::Points;
+    use crate::progress::Progress;
+    use glam::DVec3;
+
+    #[test]
+    fn near_cubes_are_those_of_a_search() {
+        // Points on a bent sheet, so that some bricks are empty.
+        let positions: Vec<f32> = (0..3000)
+            .flat_map(|i| [(i * 7919 % 3000) as f32, (i * 6101 % 3000) as f32, (i * i % 700) as f32])
+            .collect();
+        let points = Points::from_f32(&positions).unwrap();
+        let max = DVec3::new(3000.0, 3000.0, 700.0);
+        let lattice = Lattice::new(DVec3::ZERO, max, || DVec3::ZERO, 120.0, CUBES);
+        let progress = Progress::silent();
+        let (grid, _) = Grid::sort(&points, &lattice, &progress.stage("test", 0.0..1.0), |_, _| ()).unwrap();
+        let all: Vec<(usize, usize, u32, IVec3)> = (0..grid.blocks.len())
+            .flat_map(|block| grid.cubes_in(block))
+            .map(|(brick, cube, bit)| (brick, cube, bit, 4 * grid.bricks.places[brick] + cube_centre(bit).as_ivec3()))
+            .collect();
+        let (mut around, mut near) = (Around::new(), Vec::new());
+        for &(brick, _, bit, place) in &all {
+            for reach in [1, 2] {
+                around.near(&grid, brick, bit, reach, &mut near);
+                let mut expected: Vec<(IVec3, usize)> = all
+                    .iter()
+                    .map(|&(_, cube, _, other)| (other - place, cube))
+                    .filter(|(step, _)| step.abs().max_element() <= reach as i32)
+                    .collect();
+                expected.sort_by_key(|(step, _)| (step.z, step.y, step.x));
+                let found: Vec<(IVec3, usize)> = near.iter().map(|&(step, cube)| (step.as_ivec3(), cube)).collect();
+                assert_eq!(found, expected);
+            }
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! How large a neighbourhood each cube is to rest on.
+
+use super::SIZES;
+use super::level::Level;
+use super::surface::Quadric;
+use crate::error::Error;
+use crate::lattice::cube_centre;
+use crate::parallel::Filling;
+use crate::progress::Stage;
+use glam::Vec3;
+
+/// The surface that was chosen for a cube of the smallest level, in its edges and against its centre.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Chosen {
+    /// About the centroid of the cube's points; its slope there is a unit vector, or zero if there is no surface.
+    pub quadric: Quadric,
+    /// Variance of the points' distances from it.
+    pub noise: f32,
+    /// By how much that is exceeded by chance: one standard deviation, as a factor.
+    pub chance: f32,
+    /// Variance of the angle of the normal, with what the surface does not fit; infinite if there is no surface.
+    pub error: f32,
+    /// Variance of the points along it, in the direction in which it is less.
+    pub width: f32,
+    /// The surface variation there.
+    pub variation: f32,
+    /// Whether it is thin against its width, so that its noise can be compared.
+    pub is_flat: bool,
+    /// How often the edge was doubled.
+    pub doublings: u32,
+}
+
+impl Chosen {
+    /// Whether there is a surface.
+    pub fn is_some(&self) -> bool {
+        self.error < f32::INFINITY
+    }
+}
+
+/// A residual exceeds the noise of smaller neighbourhoods when it does so by this many standard deviations.
+const EXCESS: f32 = 6.0;
+
+/// The square angle that a misfit of the size of the neighbourhood is taken for.
+const MISFIT: f32 = 2.0;
+
+/// A neighbourhood is flat when it is so many times as wide as thick, squared.
+const FLAT: f32 = 2.0;
+
+/// Square angles less than this are no difference.
+const SAME: f32 = 1e-5;
+
+/// Chooses for every cube of the last of the levels, which come from large cubes to small ones.
+#[inline(never)]
+pub(super) fn choose(levels: &[Level], stage: &Stage) -> Result<Vec<Chosen>, Error> {
+    let smallest = &levels[levels.len() - 1];
+    let chosen = Filling::new(smallest.cubes(), "the surfaces")?;
+    smallest.grid.each_cube(stage, &|brick, cube, bit| {
+        let centre = smallest.centroid(cube);
+        let position = smallest.position(brick, cube_centre(bit) + centre);
+        // SAFETY: once for each cube.
+        unsafe { chosen.write(cube, of_cube(levels, cube, centre, position)) };
+    })?;
+    // SAFETY: these were all cubes.
+    Ok(unsafe { chosen.complete() })
+}
+
+/// The surface of least error: the variance of its normal, and the bias, which is told by how much more the normal
+/// differs from those of smaller neighbourhoods than their variances account for (Goldenshluger and Lepski, "Bandwidth
+/// selection in kernel density estimation", Annals of Statistics 39 (2011) 1608-1632), and by the misfit.
+#[optimize(size)]
+#[inline(never)]
+fn of_cube(levels: &[Level], smallest: usize, centre: Vec3, position: Vec3) -> Chosen {
+    let mut best = Chosen {
+        quadric: Quadric { centre, ..Quadric::default() },
+        noise: 0.0,
+        chance: 1.0,
+        error: f32::INFINITY,
+        width: 1.0,
+        variation: 0.0,
+        is_flat: false,
+        doublings: 0,
+    };
+    let mut smaller = [(Vec3::ZERO, 0.0); SIZES];
+    let mut count = 0;
+    let mut reference = f32::INFINITY;
+    let mut edge = 0.5f32;
+    for (doublings, level) in (0..).zip(levels.iter().rev()) {
+        edge *= 2.0;
+        let found = if doublings == 0 { Some((smallest, centre)) } else { level.find(position) };
+        let Some((cube, place)) = found else { continue };
+        let surface = &level.surfaces[cube];
+        if !surface.is_some() {
+            continue;
+        }
+        let (slope, height) = surface.quadric.at(place);
+        let scale = slope.length_recip();
+        let normal = slope * scale;
+        let variance = surface.variance_at(place);
+        let bias = smaller[..count].iter().fold(0.0f32, |bias, &(other, other_variance)| {
+            let cosine = normal.dot(other);
+            bias.max(1.0 - cosine * cosine - variance - other_variance - SAME)
+        });
+        if bias >= best.error {
+            break;
+        }
+        smaller[count] = (normal, variance);
+        count += 1;
+
+        let square = edge * edge;
+        let (noise, width) = (surface.noise * square, surface.width * square);
+        let chance = (2.0 / surface.points).sqrt();
+        let misfit = (noise - reference * (1.0 + EXCESS * chance)).max(0.0);
+        let error = bias + variance + MISFIT * misfit / width;
+        let is_flat = surface.is_curved && noise * FLAT < width;
+        if error <= best.error {
+            let bend = surface.quadric.bend.scaled(scale / edge);
+            let quadric = Quadric { centre, height: height * scale * edge, slope: normal, bend };
+            best = Chosen { quadric, noise, chance, error, width, variation: surface.variation, is_flat, doublings };
+        }
+        if is_flat {
+            reference = reference.min(noise * (1.0 + EXCESS * (2.0 / (surface.points - 6.0)).sqrt()));
+        }
+    }
+    best
+}

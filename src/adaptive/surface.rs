@@ -1,0 +1,425 @@
+//! A quadratic surface through the samples of a neighbourhood, and how much its normals are to be trusted.
+
+use super::samples::Window;
+use crate::pca::Symmetric;
+use glam::{DVec3, Vec3, Vec4};
+
+/// A symmetric matrix: xx, yy, zz and yz, xz, xy.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Matrix {
+    pub diagonal: Vec3,
+    pub off: Vec3,
+}
+
+impl Matrix {
+    /// The product with a vector.
+    #[inline(always)]
+    pub fn times(&self, p: Vec3) -> Vec3 {
+        let (d, o) = (self.diagonal, self.off);
+        Vec3::new(
+            d.x * p.x + o.z * p.y + o.y * p.z,
+            o.z * p.x + d.y * p.y + o.x * p.z,
+            o.y * p.x + o.x * p.y + d.z * p.z,
+        )
+    }
+
+    /// `a b^T + b a^T`, halved.
+    #[inline(always)]
+    pub fn product(a: Vec3, b: Vec3) -> Self {
+        let off = Vec3::new(a.y * b.z + a.z * b.y, a.x * b.z + a.z * b.x, a.x * b.y + a.y * b.x);
+        Self { diagonal: a * b, off: 0.5 * off }
+    }
+
+    #[inline(always)]
+    pub fn scaled(&self, factor: f32) -> Self {
+        Self { diagonal: self.diagonal * factor, off: self.off * factor }
+    }
+
+    #[inline(always)]
+    pub fn plus(&self, other: Self) -> Self {
+        Self { diagonal: self.diagonal + other.diagonal, off: self.off + other.off }
+    }
+}
+
+/// The zeros of `height + slope . d + d . bend d / 2`, where `d` is what lies between `centre` and a point: near them its
+/// value is the distance from the surface, and its gradient the normal.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Quadric {
+    pub centre: Vec3,
+    pub height: f32,
+    pub slope: Vec3,
+    pub bend: Matrix,
+}
+
+impl Quadric {
+    /// The gradient and the value at a point.
+    #[inline(always)]
+    pub fn at(&self, point: Vec3) -> (Vec3, f32) {
+        let d = point - self.centre;
+        let turn = self.bend.times(d);
+        (self.slope + turn, self.height + d.dot(self.slope + 0.5 * turn))
+    }
+}
+
+/// A surface, in the edges of its cube and against that cube's centre.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Surface {
+    pub quadric: Quadric,
+    /// Variance of the points' distances from it.
+    pub noise: f32,
+    /// Variance of the angle of its normal, in the centre; infinite where there is no surface.
+    pub error: f32,
+    /// What that gains with the square of the distance from the centre.
+    pub error_growth: f32,
+    /// Variance of the points along the surface, in the direction in which it is less.
+    pub width: f32,
+    /// Surface variation: the least eigenvalue of the points' covariance, as a share of all three.
+    pub variation: f32,
+    /// How many points it rests on.
+    pub points: f32,
+    /// Whether more than a plane could be told.
+    pub is_curved: bool,
+    /// Whether the samples lie off it by more than their points' own spread accounts for.
+    pub lacks_detail: bool,
+}
+
+impl Surface {
+    pub const NONE: Self = Self {
+        quadric: Quadric {
+            centre: Vec3::ZERO,
+            height: 0.0,
+            slope: Vec3::ZERO,
+            bend: Matrix { diagonal: Vec3::ZERO, off: Vec3::ZERO },
+        },
+        noise: 0.0,
+        error: f32::INFINITY,
+        error_growth: 0.0,
+        width: 0.0,
+        variation: 0.0,
+        points: 0.0,
+        is_curved: false,
+        lacks_detail: false,
+    };
+
+    /// Variance of the angle of its normal at a place.
+    pub fn variance_at(&self, place: Vec3) -> f32 {
+        self.error + self.error_growth * place.distance_squared(self.quadric.centre)
+    }
+
+    /// Whether there is one.
+    pub fn is_some(&self) -> bool {
+        self.error < f32::INFINITY
+    }
+}
+
+/// With fewer samples a surface is taken for a plane.
+const QUADRIC_SAMPLES: f64 = 10.0;
+
+/// Added to the variance of a plane's normal, square radians: nothing tells how bent the surface is.
+const PLANE_ERROR: f64 = 0.1;
+
+/// Added to the variance of a normal in a strip of points that is narrower than this share of its length, squared: its
+/// own bend across, or its noise, may be all that makes it look like a surface.
+const STRIP: f64 = 0.03;
+const STRIP_ERROR: f64 = 0.3;
+
+/// No surface is known to less than so many edges.
+const FIT: f64 = 0.003;
+
+impl Window {
+    /// The surface that fits the samples best: the plane of the principal components, then by least squares the height
+    /// over it as a quadratic function.
+    pub fn fit(&self) -> Option<Surface> {
+        if self.len() < 3 {
+            return None;
+        }
+        let [points, total, x, y, z, xx, yy, zz, yz, xz, xy] = self.moments();
+        let mean = DVec3::new(x, y, z) / total;
+        let diagonal = DVec3::new(xx, yy, zz) / total - mean * mean;
+        let off = DVec3::new(yz, xz, xy) / total - DVec3::new(mean.y * mean.z, mean.x * mean.z, mean.x * mean.y);
+        let covariance = Symmetric { diagonal, off };
+        let normal = covariance.normal(covariance.smallest_eigenvalue(), 1.0)?;
+        let (u, v, [along, across, thick]) = principal(&covariance, normal);
+        let (mean, normal) = (mean.as_vec3(), normal.as_vec3());
+        let count = self.len() as f64;
+        // How badly noise turns a plane as thick as it is wide.
+        let thickness = across / (across - thick).max(1e-9 * along);
+        let thickness = thickness * thickness;
+        let strip = STRIP * along / across.max(1e-9 * along);
+        let strip_error = STRIP_ERROR * (strip * strip) * (strip * strip);
+
+        let mut surface = Surface {
+            quadric: Quadric { centre: mean, height: 0.0, slope: normal, bend: Matrix::default() },
+            noise: (thick * count / (count - 3.0).max(1.0)) as f32,
+            width: across as f32,
+            variation: (thick / (along + across + thick)) as f32,
+            points: points as f32,
+            ..Surface::default()
+        };
+        if count >= QUADRIC_SAMPLES
+            && let Some(fit) = self.quadratic(mean, [u, v, normal], [along, across], total)
+        {
+            let [_, a, b, aa, ab, bb] = fit.coefficients.map(|c| c as f32);
+            let slope = normal - a * u - b * v;
+            let bend = Matrix::product(u, u).scaled(2.0 * aa);
+            let bend = bend.plus(Matrix::product(u, v).scaled(2.0 * ab)).plus(Matrix::product(v, v).scaled(2.0 * bb));
+            let scale = slope.length_recip();
+            surface.quadric = Quadric {
+                centre: mean + normal * fit.coefficients[0] as f32,
+                height: 0.0,
+                slope: slope * scale,
+                bend: bend.scaled(-scale),
+            };
+            let within = self.within(&surface.quadric, total);
+            let residual = fit.residual * count / (count - 6.0);
+            let noise = residual + within;
+            if points > count {
+                // Lack of fit: the variance of a point, told by the samples' distances and by the spread in each.
+                let between = residual * points / count;
+                let own = within * points / (points - count);
+                surface.lacks_detail = between > own * (1.0 + 3.0 * (2.0 / (count - 6.0)).sqrt()) + FIT * FIT;
+            }
+            surface.noise = noise as f32;
+            surface.is_curved = true;
+            // Few samples more than coefficients leave the residual uncertain.
+            let few = 1.0 / (count - 6.0);
+            let variance = (noise + FIT * FIT) / points * thickness * (1.0 + 8.0 * few + 100.0 * few * few);
+            let [_, a, b, aa, ab, bb] = fit.variances;
+            surface.error = (variance * (a + b) + strip_error) as f32;
+            surface.error_growth = (variance * (4.0 * aa + ab).max(4.0 * bb + ab)) as f32;
+        } else {
+            let variance = f64::from(surface.noise).max(1e-14 * along) / points * thickness;
+            surface.error = (variance * (1.0 / along + 1.0 / across) + PLANE_ERROR + strip_error) as f32;
+        }
+        Some(surface)
+    }
+
+    /// Least squares of the height over the plane of `frame`, as a function 1, u, v, uu, uv, vv.
+    fn quadratic(&self, mean: Vec3, frame: [Vec3; 3], [along, across]: [f64; 2], total: f64) -> Option<Fit> {
+        let unit = [along.sqrt(), across.sqrt()];
+        let (u, v, n) = (frame[0] / unit[0] as f32, frame[1] / unit[1] as f32, frame[2]);
+        let at = |axis: Vec3, x: Vec4, y: Vec4, z: Vec4| x * axis.x + y * axis.y + z * axis.z - axis.dot(mean);
+        let sums = self.sum(|[x, y, z, w]| {
+            let (u, v, h) = (at(u, x, y, z), at(v, x, y, z), at(n, x, y, z));
+            let (uu, uv, vv, wh) = (u * u, u * v, v * v, w * h);
+            let (wuu, wuv, wvv) = (w * uu, w * uv, w * vv);
+            [
+                w * u,
+                w * v,
+                wuu,
+                wuv,
+                wvv, //
+                wuu * u,
+                wuu * v,
+                wuv * v,
+                wvv * v, //
+                wuu * uu,
+                wuu * uv,
+                wuu * vv,
+                wuv * vv,
+                wvv * vv, //
+                wh,
+                wh * u,
+                wh * v,
+                wh * uu,
+                wh * uv,
+                wh * vv,
+                wh * h,
+            ]
+        });
+        let [u1, v1, uu, uv, vv, uuu, uuv, uvv, vvv, u4, u3v, uuvv, uv3, v4, h, hu, hv, huu, huv, hvv, hh] =
+            sums.map(|sum| sum / total);
+        let mut matrix = [
+            [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [u1, uu, 0.0, 0.0, 0.0, 0.0],
+            [v1, uv, vv, 0.0, 0.0, 0.0],
+            [uu, uuu, uuv, u4 + RIDGE, 0.0, 0.0],
+            [uv, uuv, uvv, u3v, uuvv + RIDGE, 0.0],
+            [vv, uvv, vvv, uuvv, uv3, v4 + RIDGE],
+        ];
+        let right = [h, hu, hv, huu, huv, hvv];
+        let (mut coefficients, mut variances) = solve(&mut matrix, right)?;
+        let explained: f64 = coefficients.iter().zip(right).map(|(c, r)| c * r).sum();
+        let [u, v] = unit;
+        for (i, unit) in [1.0, u, v, u * u, u * v, v * v].into_iter().enumerate() {
+            coefficients[i] /= unit;
+            variances[i] /= unit * unit;
+        }
+        Some(Fit { coefficients, variances, residual: (hh - explained).max(0.0) })
+    }
+
+    /// The mean variance, across the surface, of the points behind the samples.
+    fn within(&self, quadric: &Quadric, total: f64) -> f64 {
+        let Quadric { centre, slope, bend: Matrix { diagonal: d, off: o }, .. } = *quadric;
+        let sum = self.sum_spread(|[x, y, z, _]| {
+            let (x, y, z) = (x - centre.x, y - centre.y, z - centre.z);
+            [
+                d.x * x + o.z * y + o.y * z + slope.x,
+                o.z * x + d.y * y + o.x * z + slope.y,
+                o.y * x + o.x * y + d.z * z + slope.z,
+            ]
+        });
+        // Rounding may leave less than nothing.
+        (sum / total).max(0.0)
+    }
+}
+
+/// Keeps curvature at zero where the samples do not tell it, as on two scan lines.
+const RIDGE: f64 = 1e-3;
+
+/// A quadratic function; each list in the order 1, u, v, uu, uv, vv.
+struct Fit {
+    coefficients: [f64; 6],
+    /// Of the coefficients, for samples of variance 1.
+    variances: [f64; 6],
+    /// The mean square of what is left.
+    residual: f64,
+}
+
+/// Solves a positive definite system, of which the lower half is given, by Cholesky's method; also answers the diagonal
+/// of the inverse.
+#[optimize(size)]
+#[inline(never)]
+#[expect(clippy::needless_range_loop, reason = "rows and columns, as in the textbook")]
+fn solve(matrix: &mut [[f64; 6]; 6], mut right: [f64; 6]) -> Option<([f64; 6], [f64; 6])> {
+    let mut inverse = [[0.0; 6]; 6];
+    for i in 0..6 {
+        for j in 0..=i {
+            let mut sum = matrix[i][j];
+            for k in 0..j {
+                sum -= matrix[i][k] * matrix[j][k];
+            }
+            if j < i {
+                matrix[i][j] = sum * matrix[j][j];
+            } else if sum > 0.0 {
+                // The diagonal is kept as its reciprocal.
+                matrix[i][i] = 1.0 / sum.sqrt();
+            } else {
+                return None;
+            }
+        }
+        inverse[i][i] = matrix[i][i];
+        for j in 0..i {
+            let mut sum = 0.0;
+            for k in j..i {
+                sum += matrix[i][k] * inverse[k][j];
+            }
+            inverse[i][j] = -sum * matrix[i][i];
+        }
+    }
+    let mut half = [0.0; 6];
+    for i in 0..6 {
+        for k in 0..=i {
+            half[i] += inverse[i][k] * right[k];
+        }
+    }
+    let mut diagonal = [0.0; 6];
+    for j in 0..6 {
+        right[j] = 0.0;
+        for i in j..6 {
+            right[j] += inverse[i][j] * half[i];
+            diagonal[j] += inverse[i][j] * inverse[i][j];
+        }
+    }
+    Some((right, diagonal))
+}
+
+/// The two other eigenvectors of a covariance, and its eigenvalues, the largest first.
+#[optimize(size)]
+#[inline(never)]
+fn principal(covariance: &Symmetric, normal: DVec3) -> (Vec3, Vec3, [f64; 3]) {
+    let times = |p: DVec3| {
+        let (d, o) = (covariance.diagonal, covariance.off);
+        DVec3::new(
+            d.x * p.x + o.z * p.y + o.y * p.z,
+            o.z * p.x + d.y * p.y + o.x * p.z,
+            o.y * p.x + o.x * p.y + d.z * p.z,
+        )
+    };
+    let u = normal.any_orthonormal_vector();
+    let v = normal.cross(u);
+    let (cu, cv) = (times(u), times(v));
+    let (uu, uv, vv) = (u.dot(cu), u.dot(cv), v.dot(cv));
+    let (half, middle) = (0.5 * (uu - vv), 0.5 * (uu + vv));
+    let root = (half * half + uv * uv).sqrt();
+    // The direction of the larger, from whichever of the two forms is not short.
+    let direction = if half >= 0.0 { u * (half + root) + v * uv } else { u * uv + v * (root - half) };
+    let first = direction.try_normalize().unwrap_or(u);
+    let second = normal.cross(first);
+    let values = [middle + root, (middle - root).max(0.0), normal.dot(times(normal)).max(0.0)];
+    (first.as_vec3(), second.as_vec3(), values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::samples::{Sample, Window, Writing};
+    use super::*;
+
+    /// A window of points, each a sample.
+    fn window(points: impl Iterator<Item = Vec3>) -> Window {
+        let points: Vec<Vec3> = points.collect();
+        let samples = Writing::new(points.len()).unwrap();
+        for (i, point) in points.iter().enumerate() {
+            // SAFETY: each once.
+            unsafe { samples.write(i, Sample::point(*point)) };
+        }
+        // SAFETY: all were written.
+        let samples = unsafe { samples.complete() };
+        let mut window = Window::new();
+        window.add(&samples, 0..points.len(), Vec3::ZERO, 1.0);
+        window
+    }
+
+    fn grid(side: i32) -> impl Iterator<Item = (f32, f32)> {
+        (0..side * side).map(move |i| {
+            let place = |i: i32| 2.0 * i as f32 / (side - 1) as f32 - 1.0;
+            // Not quite a grid, so that no sum is zero by chance.
+            (place(i % side) + 0.01 * (i % 3) as f32, place(i / side) - 0.007 * (i % 5) as f32)
+        })
+    }
+
+    #[test]
+    fn quadratic_surfaces_are_exact() {
+        let height = |x: f32, y: f32| 0.2 + 0.1 * x - 0.05 * y + 0.04 * x * x + 0.03 * x * y - 0.02 * y * y;
+        let surface = window(grid(7).map(|(x, y)| Vec3::new(x, y, height(x, y)))).fit().unwrap();
+        assert!(surface.is_curved && surface.noise < 1e-4, "{surface:?}");
+        for (x, y) in grid(5) {
+            let (gradient, distance) = surface.quadric.at(Vec3::new(x, y, height(x, y)));
+            let truth = Vec3::new(-0.1 - 0.08 * x - 0.03 * y, 0.05 - 0.03 * x + 0.04 * y, 1.0).normalize();
+            let sine = gradient.normalize().cross(truth).length();
+            assert!(sine < 0.01, "{sine} at {x}, {y}");
+            assert!(distance.abs() < 0.003, "{distance} at {x}, {y}");
+        }
+    }
+
+    /// The mean of the variance that the fit claims is the mean square of the errors that it makes.
+    #[test]
+    fn the_variance_of_the_normal_is_told() {
+        let (mut claimed, mut made) = (0.0, 0.0);
+        let mut state = 1u32;
+        let mut uniform = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 8_388_608.0 - 1.0
+        };
+        for _ in 0..200 {
+            // The noise has a deviation of 0.05.
+            let noisy = window(grid(7).map(|(x, y)| Vec3::new(x, y, 0.05 * (uniform() + uniform() + uniform()))));
+            let surface = noisy.fit().unwrap();
+            assert!((surface.noise.sqrt() / 0.05 - 1.0).abs() < 0.4, "{}", surface.noise);
+            let (gradient, _) = surface.quadric.at(surface.quadric.centre);
+            claimed += surface.error;
+            made += gradient.normalize().truncate().length_squared();
+        }
+        assert!((0.7..1.8).contains(&(claimed / made)), "{} times", claimed / made);
+    }
+
+    #[test]
+    fn nothing_that_is_no_surface_is_one() {
+        assert!(window((0..2).map(|i| Vec3::splat(i as f32))).fit().is_none());
+        assert!(window((0..9).map(|_| Vec3::splat(0.3))).fit().is_none());
+        assert!(window((0..9).map(|i| 0.1 * i as f32 * Vec3::ONE)).fit().is_none());
+        // A bent line lies in a plane, but in any other as well.
+        let line = window((0..40).map(|i| Vec3::new(0.05 * i as f32, 1e-3 * (i * i) as f32 / 40.0, 0.0)));
+        assert!(line.fit().is_none_or(|surface| surface.error > 0.03));
+    }
+}
