@@ -88,13 +88,15 @@ impl Lattice {
     #[inline(always)]
     fn split(place: DVec3) -> (IVec3, Vec3) {
         let brick = (place * (1.0 / f64::from(BRICK))).as_ivec3();
-        let local = (place - brick.as_dvec3() * f64::from(BRICK)).as_vec3();
-        (brick, local.min(Vec3::splat(BELOW_BRICK)))
+        // Cut off to what single precision holds, not rounded: so a place never reaches the next cube, and its cube of half
+        // the edge, where places are twice as large, is always a part of its cube.
+        let local = (place - brick.as_dvec3() * f64::from(BRICK)) * STEPS;
+        (brick, local.floor().as_vec3() * (1.0 / STEPS) as f32)
     }
 }
 
-/// The largest number below 4.
-const BELOW_BRICK: f32 = (BRICK as f32).next_down();
+/// Steps of a place within an edge: those below 4 are single-precision numbers.
+const STEPS: f64 = (1 << 22) as f64;
 
 /// The octant of a place in a brick (the first three of four lanes): eight times its cube `x + 4 y + 16 z`, and bits 0, 1
 /// and 2 tell whether it is not below the cube's centre along x, y and z.
@@ -110,4 +112,37 @@ pub(crate) fn octant_in_brick(place: Vec4) -> u32 {
 #[inline]
 pub(crate) fn cube_centre(bit: u32) -> Vec3 {
     UVec3::new(bit & 3, bit >> 2 & 3, bit >> 4).as_vec3() + 0.5
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The cube of a place, counted from the corner of the grid.
+    fn cube(lattice: &Lattice, point: Vec3) -> IVec3 {
+        let (brick, local) = lattice.locate(point).unwrap();
+        assert!(local.cmpge(Vec3::ZERO).all() && local.cmplt(Vec3::splat(BRICK as f32)).all(), "{local}");
+        let bit = octant_in_brick(local.extend(0.0)) / 8;
+        BRICK * brick + cube_centre(bit).as_ivec3()
+    }
+
+    /// Also next to their sides, where single precision does not tell a place from the side.
+    #[test]
+    fn cubes_of_half_the_edge_are_parts_of_the_whole_ones() {
+        for edge in [1.0, 0.7, 0.001] {
+            let lattice = Lattice::new(DVec3::ZERO, DVec3::splat(64.0 * edge), || DVec3::ZERO, edge, CUBES);
+            let finer = lattice.finer();
+            for side in 1..128 {
+                let side = (f64::from(side) * 0.5 * edge) as f32;
+                let mut point = Vec3::splat(side);
+                for _ in 0..8 {
+                    point = point.map(f32::next_down);
+                }
+                for _ in 0..16 {
+                    assert_eq!(cube(&finer, point) / 2, cube(&lattice, point), "{point}, edge {edge}");
+                    point = point.map(f32::next_up);
+                }
+            }
+        }
+    }
 }
