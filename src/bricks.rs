@@ -8,7 +8,8 @@ use crate::progress::Stage;
 use glam::IVec3;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-/// The occupied bricks, numbered from 0 in the order z, y, x.
+/// The occupied bricks, numbered from 0; those in a box in layers across its longest axis: so what is near in space is near
+/// in memory, and bricks in a row are a slice of the cloud with little surface.
 pub(crate) struct Bricks {
     /// The place of each brick.
     pub places: Vec<IVec3>,
@@ -18,12 +19,58 @@ pub(crate) struct Bricks {
 /// From a place to the number of its brick.
 enum Index {
     /// One bit for each brick of the box, and the number of bricks before each word of 64: 1.5 bits a brick.
-    Box { size: IVec3, bits: Vec<u64>, before: Vec<u32> },
+    Box { layout: Layout, bits: Vec<u64>, before: Vec<u32> },
     /// For boxes that are nearly empty: an open-addressed table, its length a power of two.
     Table { slots: Vec<u32> },
 }
 
 const FREE: u32 = u32::MAX;
+
+/// The order of the bricks of a box.
+#[derive(Clone, Copy)]
+struct Layout {
+    first: IVec3,
+    /// Bricks along each axis.
+    size: IVec3,
+    /// What lies between two bricks next to each other along each axis.
+    strides: IVec3,
+}
+
+impl Layout {
+    fn of(lattice: &Lattice) -> Self {
+        let (first, size) = lattice.bricks();
+        let IVec3 { x, y, z } = size;
+        // Wraps in a box that is too large for any slot to be asked for.
+        let strides = match size.max_element() {
+            longest if longest == z => IVec3::new(1, x, x.wrapping_mul(y)),
+            longest if longest == y => IVec3::new(z, z.wrapping_mul(x), 1),
+            _ => IVec3::new(y.wrapping_mul(z), 1, y),
+        };
+        Self { first, size, strides }
+    }
+
+    fn volume(&self) -> f64 {
+        self.size.as_dvec3().element_product()
+    }
+
+    /// Whether a brick is in the box.
+    #[inline(always)]
+    fn holds(&self, brick: IVec3) -> bool {
+        let place = (brick - self.first).as_uvec3();
+        // Below the first are large numbers.
+        place.cmplt(self.size.as_uvec3()).all()
+    }
+
+    /// The paper's key (Eq. 4), of a brick instead of a cube.
+    #[inline(always)]
+    fn slot(&self, brick: IVec3) -> usize {
+        (brick - self.first).dot(self.strides) as usize
+    }
+
+    fn brick(&self, slot: usize) -> IVec3 {
+        self.first + IVec3::splat(slot as i32) / self.strides % self.size
+    }
+}
 
 /// The key of a point that lies in no brick.
 pub(crate) const OUTSIDE: u32 = u32::MAX;
@@ -31,19 +78,18 @@ pub(crate) const OUTSIDE: u32 = u32::MAX;
 impl Bricks {
     /// Finds the bricks of all points, and for each point the number of its brick. Two passes, parallel.
     pub fn find(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
-        let size = lattice.bricks();
-        let volume = size.as_dvec3().element_product();
+        let layout = Layout::of(lattice);
         // At most 3 bytes a point. A surface with a few points in a cube needs a tenth of that.
         let limit = (16.0 * points.len() as f64).clamp(1e6, 2e9);
-        if volume <= limit {
-            Self::in_box(points, lattice, size, stage)
+        if layout.volume() <= limit {
+            Self::in_box(points, lattice, layout, stage)
         } else {
             Self::in_table(points, lattice, stage)
         }
     }
 
-    fn in_box(points: &Points, lattice: &Lattice, size: IVec3, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
-        let count = (size.x as usize * size.y as usize * size.z as usize).div_ceil(64);
+    fn in_box(points: &Points, lattice: &Lattice, layout: Layout, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
+        let count = (layout.volume() as usize).div_ceil(64);
         let mut bits: Vec<AtomicU64> = Vec::new();
         reserve(&mut bits, count, "the grid")?;
         bits.resize_with(count, AtomicU64::default);
@@ -52,7 +98,7 @@ impl Bricks {
             for point in parallel::piece(points.len(), CHUNK, i) {
                 let mut key = OUTSIDE;
                 if let Some((brick, _)) = lattice.locate(points.positions[point]) {
-                    let slot = slot(size, brick);
+                    let slot = layout.slot(brick);
                     key = slot as u32;
                     let (word, bit) = (&bits[slot / 64], 1 << (slot % 64));
                     // Reading first: most points find their bit set, and then no thread waits for another.
@@ -78,7 +124,7 @@ impl Bricks {
         let mut places = Vec::new();
         reserve(&mut places, total as usize, "the grid")?;
         for (i, &word) in bits.iter().enumerate() {
-            places.extend(set_bits(word).map(|bit| place(size, 64 * i + bit as usize)));
+            places.extend(set_bits(word).map(|bit| layout.brick(64 * i + bit as usize)));
         }
 
         let target = Scatter::new(&mut keys);
@@ -90,7 +136,7 @@ impl Bricks {
                 }
             }
         })?;
-        Ok((Self { places, index: Index::Box { size, bits, before } }, keys))
+        Ok((Self { places, index: Index::Box { layout, bits, before } }, keys))
     }
 
     fn in_table(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
@@ -147,11 +193,11 @@ impl Bricks {
     #[inline(always)]
     pub fn number(&self, brick: IVec3) -> Option<u32> {
         match &self.index {
-            Index::Box { size, bits, before } => {
-                if brick.cmplt(IVec3::ZERO).any() || brick.cmpge(*size).any() {
+            Index::Box { layout, bits, before } => {
+                if !layout.holds(brick) {
                     return None;
                 }
-                let slot = slot(*size, brick);
+                let slot = layout.slot(brick);
                 (bits[slot / 64] >> (slot % 64) & 1 == 1).then(|| rank(bits, before, slot))
             }
             Index::Table { slots } => {
@@ -180,16 +226,6 @@ pub(crate) fn set_bits(mut bits: u64) -> impl Iterator<Item = u32> {
 /// How many bricks come before a slot.
 fn rank(bits: &[u64], before: &[u32], slot: usize) -> u32 {
     before[slot / 64] + (bits[slot / 64] & ((1 << (slot % 64)) - 1)).count_ones()
-}
-
-/// The paper's key (Eq. 4), of a brick instead of a cube.
-fn slot(size: IVec3, brick: IVec3) -> usize {
-    (brick.z as usize * size.y as usize + brick.y as usize) * size.x as usize + brick.x as usize
-}
-
-fn place(size: IVec3, slot: usize) -> IVec3 {
-    let (row, x) = (slot / size.x as usize, slot % size.x as usize);
-    IVec3::new(x as i32, (row % size.y as usize) as i32, (row / size.y as usize) as i32)
 }
 
 fn sort(places: &mut Vec<IVec3>) {

@@ -12,6 +12,10 @@ use glam::{DVec3, UVec3};
 /// what is not smooth needs only two or three divisions.
 const POINTS_PER_CELL: f64 = 32.0;
 
+/// Small clouds are given so many occupied cubes all the same, if these then hold as many points.
+const LEAST_CELLS: f64 = 50.0;
+const LEAST_POINTS_PER_CELL: f64 = 2.0;
+
 /// How many places 'auto' looks at.
 const PROBES: usize = 256;
 
@@ -42,6 +46,7 @@ pub(crate) fn paper_edge(extent: DVec3, count: usize) -> f64 {
 /// The edge that `cell` asks for, in units of the positions.
 pub(crate) fn edge(cell: Cell, points: &Points, bounds: &Bounds) -> Result<f64, Error> {
     match cell {
+        Cell::Auto => populated_edge(points, bounds, &Bulk::of_points(points)),
         Cell::Scale(scale) => Ok(scale * paper_edge(bounds.extent(), bounds.finite)),
         Cell::Size(size) => {
             let edge = size / points.unit;
@@ -51,7 +56,6 @@ pub(crate) fn edge(cell: Cell, points: &Points, bounds: &Bounds) -> Result<f64, 
             let size = number::text(size);
             Err(Error::input(format_args!("cell.size is {size}, out of all proportion to the cloud; wanted another")))
         }
-        Cell::Auto => populated_edge(points, bounds),
     }
 }
 
@@ -61,17 +65,17 @@ pub(crate) fn edge(cell: Cell, points: &Points, bounds: &Bounds) -> Result<f64, 
 /// So a few points chosen at random ("probes") tell it without bias, whatever the extent of the cloud: the cubes round
 /// them are halved until they hold too few points. Stray points weigh as little as they are few.
 /// Costs one pass over the points.
-fn populated_edge(points: &Points, bounds: &Bounds) -> Result<f64, Error> {
-    let bulk = Bulk::of_points(points);
+pub(crate) fn populated_edge(points: &Points, bounds: &Bounds, bulk: &Bulk) -> Result<f64, Error> {
     let extent = if bulk.extent > 0.0 { bulk.extent } else { bounds.extent().max_element() };
     if extent <= 0.0 || bulk.sample.is_empty() {
         // One point, or hardly any that is finite.
         return Ok(paper_edge(bounds.extent(), bounds.finite));
     }
-    let probes = Probes::place(&bulk, extent, bounds.finite);
+    let probes = Probes::place(bulk, extent, bounds.finite);
     let counts = probes.count(points)?;
     // Points that coincide can't be told apart by any edge, so they count as one.
-    let target = POINTS_PER_CELL * counts[LEVELS as usize];
+    let wanted = POINTS_PER_CELL.min(bounds.finite as f64 / LEAST_CELLS).max(LEAST_POINTS_PER_CELL);
+    let target = wanted * counts[LEVELS as usize];
     let Some(level) = counts.iter().position(|&count| count < target) else {
         return Ok(probes.edge);
     };

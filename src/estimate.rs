@@ -80,7 +80,9 @@ pub struct Scale {
 /// [`Error::Cancelled`] when `progress` asked for it.
 #[optimize(size)]
 pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Result<Estimate, Error> {
-    options.validate()?;
+    if cfg!(feature = "full") {
+        options.validate()?;
+    }
     // Places and counts are 32-bit numbers.
     if points.len() >= u32::MAX as usize {
         return Err(Error::input(format_args!("the cloud has {} points; at most {} fit", points.len(), u32::MAX - 1)));
@@ -91,23 +93,17 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     let bounds = Bounds::of(points);
     laps.end("bounds");
 
-    match options.method {
-        Method::Bilinear if options.cell == Cell::Auto => adaptive(points, options, &bounds, laps),
-        _ if !cfg!(feature = "full") => Err(Error::Unsupported("of cells only 'auto' is in this module".into())),
-        Method::Bilinear => bilinear(points, options, &bounds, laps),
-        Method::Knn => baseline(points, options, Baseline::Knn { k: options.k.unwrap_or(16) as usize }, &bounds, laps),
-        Method::Egg => baseline(points, options, Baseline::Egg { k: options.k.unwrap_or(8) as usize }, &bounds, laps),
+    match (options.method, options.cell) {
+        (Method::Bilinear, Cell::Auto) => adaptive(points, options, &bounds, laps),
+        _ if !cfg!(feature = "full") => Err(Error::Unsupported("this module has only the automatic cell".into())),
+        (Method::Bilinear, cell) => bilinear(points, options, cell::edge(cell, points, &bounds)?, &bounds, laps),
+        (Method::Knn, _) => {
+            baseline(points, options, Baseline::Knn { k: options.k.unwrap_or(16) as usize }, &bounds, laps)
+        }
+        (Method::Egg, _) => {
+            baseline(points, options, Baseline::Egg { k: options.k.unwrap_or(8) as usize }, &bounds, laps)
+        }
     }
-}
-
-/// The cubes that the options ask for, at most so many along an axis.
-fn lattice(points: &Points, cell: Cell, bounds: &Bounds, most: f64, laps: &mut Laps) -> Result<Lattice, Error> {
-    laps.progress.update("cellSize", 0.03)?;
-    let edge = cell::edge(cell, points, bounds)?;
-    let centre = || Bulk::of_points(points).median;
-    let lattice = Lattice::new(bounds.min.as_dvec3(), bounds.max.as_dvec3(), centre, edge, most);
-    laps.end("cellSize");
-    Ok(lattice)
 }
 
 /// What both kinds of cells have to tell; the rest is left at its default.
@@ -116,7 +112,7 @@ fn describe(points: &Points, bounds: &Bounds, lattice: &Lattice, found: &Found, 
     Report {
         points: points.len() as u64,
         unresolved: points.len() as u64 - found.resolved,
-        grid: lattice.size.as_u64vec3().to_array(),
+        grid: lattice.size().as_u64vec3().to_array(),
         cell_size: edge * points.unit,
         scale: edge / cell::paper_edge(bounds.extent(), bounds.finite),
         milliseconds: laps.ended,
@@ -126,11 +122,14 @@ fn describe(points: &Points, bounds: &Bounds, lattice: &Lattice, found: &Found, 
 
 /// Cubes of the sizes that the cloud asks for.
 fn adaptive(points: &Points, options: &Options, bounds: &Bounds, mut laps: Laps) -> Result<Estimate, Error> {
-    let lattice = lattice(points, Cell::Auto, bounds, adaptive::CUBES, &mut laps)?;
-    let middle = Bulk::of_points(points).median.as_vec3();
     let progress = laps.progress;
+    progress.update("cellSize", 0.03)?;
+    let bulk = Bulk::of_points(points);
+    let edge = cell::populated_edge(points, bounds, &bulk)?;
+    let lattice = Lattice::new(bounds, &|| bulk.median, edge, adaptive::CUBES);
+    laps.end("cellSize");
     let lap = &mut |phase| laps.end(phase);
-    let answer = adaptive::normals(points, &lattice, middle, options.curvature, progress, lap)?;
+    let answer = adaptive::normals(points, &lattice, bulk.median.as_vec3(), options.curvature, progress, lap)?;
     let mut report = describe(points, bounds, &lattice, &answer.found, laps);
     report.cells = answer.cubes;
     report.nodes = answer.surfaces;
@@ -143,9 +142,11 @@ fn adaptive(points: &Points, options: &Options, bounds: &Bounds, mut laps: Laps)
 }
 
 /// Cubes of one size: the paper's method.
-fn bilinear(points: &Points, options: &Options, bounds: &Bounds, mut laps: Laps) -> Result<Estimate, Error> {
-    let lattice = lattice(points, options.cell, bounds, CUBES, &mut laps)?;
+fn bilinear(points: &Points, options: &Options, edge: f64, bounds: &Bounds, mut laps: Laps) -> Result<Estimate, Error> {
     let progress = laps.progress;
+    progress.update("cellSize", 0.03)?;
+    let lattice = Lattice::new(bounds, &|| Bulk::of_points(points).median, edge, CUBES);
+    laps.end("cellSize");
     let (grid, moments) = Grid::sort(points, &lattice, &progress.stage("sort", 0.06..0.55), Moments::of_cube)?;
     laps.end("sort");
     let stage = progress.stage("nodes", 0.55..0.65);

@@ -1,5 +1,6 @@
 //! From a position to its cube, and back.
 
+use crate::points::Bounds;
 use glam::{DVec3, IVec3, UVec3, Vec3, Vec4, Vec4Swizzles};
 
 /// Cubes along the edge of a brick.
@@ -8,42 +9,56 @@ pub(crate) const BRICK: i32 = 4;
 /// Cubes along an axis at the most: places must fit 32-bit numbers.
 pub(crate) const CUBES: f64 = (1 << 30) as f64;
 
-/// An endless grid of cubes, grouped in bricks of 4x4x4.
+/// A grid of cubes, grouped in bricks of 4x4x4.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lattice {
-    /// The lowest corner.
+    /// Where the first cube begins.
     base: DVec3,
     /// 1 / edge.
     scale: f64,
-    /// Cubes along each axis.
-    pub size: DVec3,
+    /// The lowest corner of the grid, and the highest, in edges from there.
+    low: DVec3,
+    high: DVec3,
 }
 
 impl Lattice {
-    /// A grid from `min` to `max`. Where that is more than `most` cubes along an axis, half of `most` on either side of
+    /// A grid within some bounds. Where that is more than `most` cubes along an axis, half of `most` on either side of
     /// `centre()`: points beyond are out of reach.
-    pub fn new(min: DVec3, max: DVec3, centre: impl FnOnce() -> DVec3, edge: f64, most: f64) -> Self {
+    pub fn new(bounds: &Bounds, centre: &dyn Fn() -> DVec3, edge: f64, most: f64) -> Self {
+        let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());
         let scale = 1.0 / edge;
         let is_long = ((max - min) * scale).cmpge(DVec3::splat(most)).any();
         let base = if is_long { min.max(centre() - most / 2.0 * edge) } else { min };
         // The same product as in `locate`, so that the point on the maximum falls into the last cube.
-        let size = (((max - base) * scale).floor() + 1.0).clamp(DVec3::ONE, DVec3::splat(most));
-        Self { base, scale, size }
+        let high = (((max - base) * scale).floor() + 1.0).clamp(DVec3::ONE, DVec3::splat(most));
+        Self { base, scale, low: DVec3::ZERO, high }
     }
 
     /// The same cubes, for positions in edges from the lowest corner of brick `origin`.
     pub fn in_edges(&self, origin: IVec3) -> Self {
-        Self { base: f64::from(-BRICK) * origin.as_dvec3(), scale: 1.0, size: self.size }
+        Self { base: f64::from(-BRICK) * origin.as_dvec3(), scale: 1.0, ..*self }
     }
 
     /// Cubes of twice the edge, eight of these in each.
     pub fn coarser(&self) -> Self {
-        Self { base: self.base, scale: 0.5 * self.scale, size: (0.5 * self.size).ceil() }
+        let (low, high) = ((0.5 * self.low).floor(), (0.5 * self.high).ceil());
+        Self { base: self.base, scale: 0.5 * self.scale, low, high }
     }
 
     /// Cubes of half the edge; there must be places for twice as many.
     pub fn finer(&self) -> Self {
-        Self { base: self.base, scale: 2.0 * self.scale, size: 2.0 * self.size }
+        Self { base: self.base, scale: 2.0 * self.scale, low: 2.0 * self.low, high: 2.0 * self.high }
+    }
+
+    /// The part of the grid from brick `first` to brick `last`.
+    pub fn part(&self, first: IVec3, last: IVec3) -> Self {
+        let corner = |brick: IVec3| f64::from(BRICK) * brick.as_dvec3();
+        Self { low: self.low.max(corner(first)), high: self.high.min(corner(last + 1)), ..*self }
+    }
+
+    /// Cubes along each axis.
+    pub fn size(&self) -> DVec3 {
+        self.high - self.low
     }
 
     /// The point at a place in a brick.
@@ -56,9 +71,10 @@ impl Lattice {
         1.0 / self.scale
     }
 
-    /// Bricks along each axis.
-    pub fn bricks(&self) -> IVec3 {
-        (self.size / f64::from(BRICK)).ceil().as_ivec3()
+    /// The lowest brick, and how many there are along each axis.
+    pub fn bricks(&self) -> (IVec3, IVec3) {
+        let first = (self.low / f64::from(BRICK)).floor().as_ivec3();
+        (first, (self.high / f64::from(BRICK)).ceil().as_ivec3() - first)
     }
 
     /// The brick of a point, and the point's place in it, in edges, from 0 up to but not including 4 (paper, Eq. 3).
@@ -70,12 +86,12 @@ impl Lattice {
     pub fn locate(&self, point: Vec3) -> Option<(IVec3, Vec3)> {
         let place = (point.as_dvec3() - self.base) * self.scale;
         // Number by number: as masks of three doubles it takes noticeably longer.
-        let is_inside = (place.x >= 0.0)
-            & (place.y >= 0.0)
-            & (place.z >= 0.0)
-            & (place.x < self.size.x)
-            & (place.y < self.size.y)
-            & (place.z < self.size.z);
+        let is_inside = (place.x >= self.low.x)
+            & (place.y >= self.low.y)
+            & (place.z >= self.low.z)
+            & (place.x < self.high.x)
+            & (place.y < self.high.y)
+            & (place.z < self.high.z);
         is_inside.then(|| Self::split(place))
     }
 
@@ -130,7 +146,8 @@ mod tests {
     #[test]
     fn cubes_of_half_the_edge_are_parts_of_the_whole_ones() {
         for edge in [1.0, 0.7, 0.001] {
-            let lattice = Lattice::new(DVec3::ZERO, DVec3::splat(64.0 * edge), || DVec3::ZERO, edge, CUBES);
+            let bounds = Bounds { min: Vec3::ZERO, max: Vec3::splat(64.0 * edge as f32), finite: 2 };
+            let lattice = Lattice::new(&bounds, &|| DVec3::ZERO, edge, CUBES);
             let finer = lattice.finer();
             for side in 1..128 {
                 let side = (f64::from(side) * 0.5 * edge) as f32;

@@ -92,7 +92,7 @@ pub(crate) fn nodes(
 mod tests {
     use super::*;
     use crate::lattice::{CUBES, Lattice};
-    use crate::points::Points;
+    use crate::points::{Bounds, Points};
     use crate::progress::Progress;
     use glam::{DMat3, DVec3, IVec3};
 
@@ -112,9 +112,9 @@ mod tests {
     fn nodes_are_those_of_the_points_in_27_cubes() {
         let positions = cloud(3000);
         let points = Points::from_f32(bytemuck::cast_slice(&positions)).unwrap();
-        let (min, max) = (DVec3::ZERO, DVec3::new(1.0, 3.0, 1.0));
+        let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(1.0, 3.0, 1.0), finite: 3000 };
         for edge in [0.03, 0.11, 0.25] {
-            let lattice = Lattice::new(min, max, || min, edge, CUBES);
+            let lattice = Lattice::new(&bounds, &|| DVec3::ZERO, edge, CUBES);
             let progress = Progress::silent();
             let stage = progress.stage("test", 0.0..1.0);
             let (grid, moments) = Grid::sort(&points, &lattice, &stage, Moments::of_cube).unwrap();

@@ -114,11 +114,14 @@ fn curvature_of_cubes() {
 #[test]
 fn a_regular_grid_on_a_plane() {
     let points: Vec<f32> = (0..10_000).flat_map(|i| [(i % 100) as f32, (i / 100) as f32, 5.0]).collect();
-    for cell in [Cell::Auto, Cell::Scale(2.0), Cell::Size(1.0), Cell::Size(2.5)] {
+    for cell in [Cell::Scale(2.0), Cell::Size(1.0), Cell::Size(2.5)] {
         let result = run(&points, cell);
         for normal in result.normals.chunks(3) {
             assert_eq!(normal, [0.0, 0.0, 1.0], "{cell:?}");
         }
+    }
+    for normal in run(&points, Cell::Auto).normals.chunks(3) {
+        assert!(normal[0].abs().max(normal[1].abs()) < 1e-12 && normal[2] == 1.0, "{normal:?}");
     }
 }
 
@@ -145,6 +148,16 @@ fn auto_begins_with_evenly_filled_cubes() {
         let report = run(&points, Cell::Size(run(&points, Cell::Auto).report.cell_size)).report;
         let filling = report.points as f64 / report.cells as f64;
         assert!((22.0..46.0).contains(&filling), "{name}: {filling} points a cube");
+    }
+}
+
+/// Small clouds begin with fewer points a cube. kNN with 10 neighbours is off by 11.7, 4.8 and 2.4 degrees here.
+#[test]
+fn auto_follows_what_has_few_points() {
+    for (count, bound) in [(50, 9.0), (200, 3.0), (1000, 0.6)] {
+        let cloud = sphere(count, 12);
+        let error = root_mean_square(&angles(&run(&cloud.points, Cell::Auto).normals, &cloud.normals));
+        assert!(error < bound, "{count} points: {error} degrees");
     }
 }
 

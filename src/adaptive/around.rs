@@ -79,7 +79,7 @@ fn facing(step: IVec3) -> u64 {
 mod tests {
     use super::*;
     use crate::lattice::{CUBES, Lattice, cube_centre};
-    use crate::points::Points;
+    use crate::points::{Bounds, Points};
     use crate::progress::Progress;
     use glam::DVec3;
 
@@ -90,8 +90,8 @@ mod tests {
             .flat_map(|i| [(i * 7919 % 3000) as f32, (i * 6101 % 3000) as f32, (i * i % 700) as f32])
             .collect();
         let points = Points::from_f32(&positions).unwrap();
-        let max = DVec3::new(3000.0, 3000.0, 700.0);
-        let lattice = Lattice::new(DVec3::ZERO, max, || DVec3::ZERO, 120.0, CUBES);
+        let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(3000.0, 3000.0, 700.0), finite: 3000 };
+        let lattice = Lattice::new(&bounds, &|| DVec3::ZERO, 120.0, CUBES);
         let progress = Progress::silent();
         let (grid, _) = Grid::sort(&points, &lattice, &progress.stage("test", 0.0..1.0), |_, _| ()).unwrap();
         let all: Vec<(usize, usize, u32, IVec3)> = (0..grid.blocks.len())

@@ -4,13 +4,14 @@ use super::SIZES;
 use super::level::Level;
 use super::surface::Quadric;
 use crate::error::Error;
-use crate::lattice::cube_centre;
 use crate::parallel::Filling;
 use crate::progress::Stage;
-use glam::Vec3;
+use bytemuck::{Pod, Zeroable};
+use glam::{IVec3, Vec3, Vec4};
 
 /// The surface that was chosen for a cube of the smallest level, in its edges and against its centre.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C, align(16))]
 pub(super) struct Chosen {
     /// About the centroid of the cube's points; its slope there is a unit vector, or zero if there is no surface.
     pub quadric: Quadric,
@@ -24,16 +25,34 @@ pub(super) struct Chosen {
     pub width: f32,
     /// The surface variation there.
     pub variation: f32,
-    /// Whether it is thin against its width, so that its noise can be compared.
-    pub is_flat: bool,
+    /// The noise again, if the surface is thin against its width, so that its noise can be compared; infinite if not.
+    pub flat_noise: f32,
     /// How often the edge was doubled.
     pub doublings: u32,
 }
 
 impl Chosen {
+    /// None at all.
+    pub const NONE: Self = Self {
+        quadric: Quadric::NONE,
+        noise: 0.0,
+        chance: 1.0,
+        error: f32::INFINITY,
+        width: 1.0,
+        variation: 0.0,
+        flat_noise: f32::INFINITY,
+        doublings: 0,
+    };
+
     /// Whether there is a surface.
     pub fn is_some(&self) -> bool {
         self.error < f32::INFINITY
+    }
+
+    /// All in their order.
+    #[inline(always)]
+    pub fn numbers(&self) -> &[Vec4; 5] {
+        bytemuck::cast_ref(self)
     }
 }
 
@@ -55,10 +74,9 @@ pub(super) fn choose(levels: &[Level], stage: &Stage) -> Result<Vec<Chosen>, Err
     let smallest = &levels[levels.len() - 1];
     let chosen = Filling::new(smallest.cubes(), "the surfaces")?;
     smallest.grid.each_cube(stage, &|brick, cube, bit| {
-        let centre = smallest.centroid(cube);
-        let position = smallest.position(brick, cube_centre(bit) + centre);
+        let place = smallest.place(brick, bit);
         // SAFETY: once for each cube.
-        unsafe { chosen.write(cube, of_cube(levels, cube, centre, position)) };
+        unsafe { chosen.write(cube, of_cube(levels, place, smallest.centroid(cube))) };
     })?;
     // SAFETY: these were all cubes.
     Ok(unsafe { chosen.complete() })
@@ -69,26 +87,20 @@ pub(super) fn choose(levels: &[Level], stage: &Stage) -> Result<Vec<Chosen>, Err
 /// selection in kernel density estimation", Annals of Statistics 39 (2011) 1608-1632), and by the misfit.
 #[optimize(size)]
 #[inline(never)]
-fn of_cube(levels: &[Level], smallest: usize, centre: Vec3, position: Vec3) -> Chosen {
-    let mut best = Chosen {
-        quadric: Quadric { centre, ..Quadric::default() },
-        noise: 0.0,
-        chance: 1.0,
-        error: f32::INFINITY,
-        width: 1.0,
-        variation: 0.0,
-        is_flat: false,
-        doublings: 0,
-    };
+fn of_cube(levels: &[Level], mut cube: IVec3, centroid: Vec3) -> Chosen {
+    let mut best = Chosen { quadric: Quadric { centre: centroid, ..Quadric::NONE }, ..Chosen::NONE };
     let mut smaller = [(Vec3::ZERO, 0.0); SIZES];
     let mut count = 0;
     let mut reference = f32::INFINITY;
-    let mut edge = 0.5f32;
+    let (mut edge, mut place) = (1.0f32, centroid);
     for (doublings, level) in (0..).zip(levels.iter().rev()) {
-        edge *= 2.0;
-        let found = if doublings == 0 { Some((smallest, centre)) } else { level.find(position) };
-        let Some((cube, place)) = found else { continue };
-        let surface = &level.surfaces[cube];
+        if doublings > 0 {
+            // Against the centre of the cube of twice the edge.
+            place = 0.5 * (place + (cube & 1).as_vec3() - 0.5);
+            (cube, edge) = (cube >> 1, 2.0 * edge);
+        }
+        let Some(number) = level.number(cube) else { continue };
+        let surface = &level.surfaces[number];
         if !surface.is_some() {
             continue;
         }
@@ -114,8 +126,10 @@ fn of_cube(levels: &[Level], smallest: usize, centre: Vec3, position: Vec3) -> C
         let is_flat = surface.is_curved && noise * FLAT < width;
         if error <= best.error {
             let bend = surface.quadric.bend.scaled(scale / edge);
-            let quadric = Quadric { centre, height: height * scale * edge, slope: normal, bend };
-            best = Chosen { quadric, noise, chance, error, width, variation: surface.variation, is_flat, doublings };
+            let quadric = Quadric { centre: centroid, height: height * scale * edge, slope: normal, bend };
+            let flat_noise = if is_flat { noise } else { f32::INFINITY };
+            let variation = surface.variation;
+            best = Chosen { quadric, noise, chance, error, width, variation, flat_noise, doublings };
         }
         if is_flat {
             reference = reference.min(noise * (1.0 + EXCESS * (2.0 / (surface.points - 6.0)).sqrt()));

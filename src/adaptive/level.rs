@@ -5,21 +5,18 @@ use super::samples::{Sample, Samples, Window, Writing};
 use super::surface::Surface;
 use crate::error::Error;
 use crate::grid::{Grid, Placed};
-use crate::lattice::{BRICK, Lattice, cube_centre, octant_in_brick};
+use crate::lattice::{BRICK, Lattice, cube_centre};
 use crate::parallel::Filling;
 use crate::points::{Points, reserve};
 use crate::progress::Stage;
 use glam::{DVec3, IVec3, Vec3};
 use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
 /// One grid.
 pub(super) struct Level {
-    /// For positions in edges of the base, from the middle of the cloud: single precision is enough for these, and they
-    /// do not depend on where the cloud lies.
     pub lattice: Lattice,
-    /// The same cubes, for the points' own coordinates.
-    sorting: Lattice,
     pub grid: Grid,
     /// Cube by cube.
     samples: Samples,
@@ -41,15 +38,9 @@ impl Level {
     /// for itself: in edges half as long.
     #[optimize(size)]
     #[inline(never)]
-    pub fn new(
-        points: &Points,
-        sorting: &Lattice,
-        lattice: Lattice,
-        wholes: Option<&[Sample]>,
-        stage: &Stage,
-    ) -> Result<Self, Error> {
+    pub fn new(points: &Points, lattice: Lattice, wholes: Option<&[Sample]>, stage: &Stage) -> Result<Self, Error> {
         let count = |placed: &[Placed], centre: Vec3| octants(placed, centre).count() as u32;
-        let (grid, mut sample_end) = Grid::sort(points, sorting, &stage.part(0.0..0.9), count)?;
+        let (grid, mut sample_end) = Grid::sort(points, &lattice, &stage.part(0.0..0.9), count)?;
         let mut total = 0;
         for end in &mut sample_end {
             total += *end;
@@ -71,66 +62,76 @@ impl Level {
         // SAFETY: as many as were counted.
         let samples = unsafe { samples.complete() };
         let (surfaces, names, wanted) = (Vec::new(), None, Vec::new());
-        Ok(Self { lattice, sorting: *sorting, grid, samples, sample_end, surfaces, names, wanted })
+        Ok(Self { lattice, grid, samples, sample_end, surfaces, names, wanted })
     }
 
-    /// Cubes of twice the edge, in which each cube of this level is a sample.
+    /// Cubes of twice the edge, in which each cube of this level is a sample. Their positions are counted from brick
+    /// `origin`: where single precision is enough, and wherever the cloud lies the same.
     #[optimize(size)]
     #[inline(never)]
-    pub fn coarser(&self, stage: &Stage) -> Result<Self, Error> {
-        let lattice = self.lattice.coarser();
+    pub fn coarser(&self, origin: IVec3, stage: &Stage) -> Result<Self, Error> {
+        let lattice = self.lattice.in_edges(origin);
         let what = "the samples";
         let (positions, wholes) = (Filling::new(self.cubes(), what)?, Filling::new(self.cubes(), what)?);
         self.grid.each_cube(&stage.part(0.0..0.3), &|brick, cube, bit| {
             let whole = self.whole(cube);
+            let position = lattice.position(self.grid.bricks.places[brick], cube_centre(bit) + whole.place);
             // SAFETY: once for each cube.
             unsafe {
-                positions.write(cube, self.position(brick, cube_centre(bit) + whole.place));
+                positions.write(cube, position);
                 wholes.write(cube, whole);
             }
         })?;
         // SAFETY: these were all cubes.
         let (positions, wholes) = unsafe { (positions.complete(), wholes.complete()) };
         let points = Points { positions: Cow::Owned(positions), origin: DVec3::ZERO, unit: 1.0 };
-        Self::new(&points, &lattice, lattice, Some(&wholes), &stage.part(0.3..1.0))
+        Self::new(&points, lattice.coarser(), Some(&wholes), &stage.part(0.3..1.0))
     }
 
-    /// Cubes of half the edge, with their surfaces, for the points in and round those that are `rough`.
+    /// Cubes of half the edge, with their surfaces, for the points in and round those of a batch that are rough.
     #[optimize(size)]
     #[inline(never)]
-    pub fn divided(&self, rough: &[bool], points: &Points, stage: &Stage) -> Result<Self, Error> {
+    pub fn divided(&self, rough: &[bool], batch: Range<usize>, points: &Points, stage: &Stage) -> Result<Self, Error> {
         let grid = &self.grid;
-        let is_near = Filling::new(self.cubes(), "the cubes")?;
+        let is_divided = |cube: usize| rough[cube] && batch.contains(&cube);
+        let mut is_near: Vec<AtomicBool> = Vec::new();
+        reserve(&mut is_near, self.cubes(), "the cubes")?;
+        is_near.resize_with(self.cubes(), AtomicBool::default);
         stage.part(0.0..0.1).run(grid.blocks.len(), &|block| {
             let (mut around, mut near) = (Around::new(), Vec::new());
-            for (brick, cube, bit) in grid.cubes_in(block) {
+            for (brick, _, bit) in grid.cubes_in(block).filter(|&(_, cube, _)| is_divided(cube)) {
                 around.near(grid, brick, bit, 1, &mut near);
-                // SAFETY: once for each cube.
-                unsafe { is_near.write(cube, near.iter().any(|&(_, cube)| rough[cube])) };
+                near.iter().for_each(|&(_, cube)| is_near[cube].store(true, Relaxed));
             }
         })?;
-        // SAFETY: these were all cubes.
-        let is_near = unsafe { is_near.complete() };
-        let near = || (0..self.cubes()).filter(|&cube| is_near[cube]).map(|cube| range(&grid.cube_end, cube));
-        let count = near().map(|range| range.len()).sum();
+        let is_near: Vec<bool> = is_near.into_iter().map(AtomicBool::into_inner).collect();
+        let (mut first, mut last, mut count) = (IVec3::MAX, IVec3::MIN, 0);
+        for (place, cubes) in grid.bricks.places.iter().zip(grid.first_cube.windows(2)) {
+            for cube in (cubes[0] as usize..cubes[1] as usize).filter(|&cube| is_near[cube]) {
+                (first, last) = (first.min(*place), last.max(*place));
+                count += self.points(cube).len();
+            }
+        }
         let (mut names, mut positions) = (Vec::new(), Vec::new());
         reserve(&mut names, count, "the detail")?;
         reserve(&mut positions, count, "the detail")?;
-        for placed in near().flat_map(|range| &grid.placed[range]) {
+        for placed in (0..self.cubes()).filter(|&cube| is_near[cube]).flat_map(|cube| self.points(cube)) {
             let name = self.name(placed);
             names.push(name);
             positions.push(points.positions[name as usize]);
         }
+        drop(is_near);
 
         let points = Points { positions: Cow::Owned(positions), origin: DVec3::ZERO, unit: 1.0 };
-        let (sorting, lattice) = (self.sorting.finer(), self.lattice.finer());
-        let mut level = Self::new(&points, &sorting, lattice, None, &stage.part(0.1..0.5))?;
+        let lattice = self.lattice.finer().part(2 * first, 2 * last + 1);
+        let mut level = Self::new(&points, lattice, None, &stage.part(0.1..0.5))?;
         level.fit(&stage.part(0.5..0.9))?;
         let wanted = Filling::new(level.cubes(), "the cubes")?;
         level.grid.each_cube(&stage.part(0.9..1.0), &|brick, cube, bit| {
-            let holder = self.holder(level.grid.bricks.places[brick], bit);
+            // In whole numbers: a point must get its normal once.
+            let whole = self.number(level.place(brick, bit) >> 1);
             // SAFETY: once for each cube.
-            unsafe { wanted.write(cube, holder.is_some_and(|cube| rough[cube])) };
+            unsafe { wanted.write(cube, whole.is_some_and(is_divided)) };
         })?;
         // SAFETY: these were all cubes.
         level.wanted = unsafe { wanted.complete() };
@@ -173,31 +174,18 @@ impl Level {
         self.whole(cube).place
     }
 
-    /// A place in a brick, in edges of the base.
-    pub fn position(&self, brick: usize, local: Vec3) -> Vec3 {
-        self.lattice.position(self.grid.bricks.places[brick], local)
-    }
-
-    /// The cube of a position, and what lies between its centre and the position.
-    pub fn find(&self, position: Vec3) -> Option<(usize, Vec3)> {
-        let (brick, local) = self.lattice.locate(position)?;
-        let bit = octant_in_brick(local.extend(0.0)) / 8;
-        Some((self.cube_at(brick, bit)?, local - cube_centre(bit)))
-    }
-
-    /// The cube in which one of half the edge lies. In whole numbers: a point must get its normal once.
-    fn holder(&self, brick: IVec3, bit: u32) -> Option<usize> {
-        let place: IVec3 = (BRICK * brick + cube_centre(bit).as_ivec3()) >> 1;
-        let (brick, inside): (IVec3, IVec3) = (place >> 2, place & 3);
-        self.cube_at(brick, (inside.x + 4 * inside.y + 16 * inside.z) as u32)
+    /// Where a cube lies, in cubes from the first there can be.
+    pub fn place(&self, brick: usize, bit: u32) -> IVec3 {
+        BRICK * self.grid.bricks.places[brick] + cube_centre(bit).as_ivec3()
     }
 
     /// The cube at a place, if it is occupied.
-    fn cube_at(&self, brick: IVec3, bit: u32) -> Option<usize> {
+    pub fn number(&self, place: IVec3) -> Option<usize> {
+        let (brick, inside): (IVec3, IVec3) = (place >> 2, place & 3);
         let brick = self.grid.bricks.number(brick)? as usize;
-        let mask = self.grid.masks[brick];
-        let before = (mask & ((1 << bit) - 1)).count_ones();
-        (mask >> bit & 1 == 1).then(|| (self.grid.first_cube[brick] + before) as usize)
+        let mask = self.grid.masks[brick] >> (inside.x + 4 * inside.y + 16 * inside.z);
+        // Those from there on, from the end.
+        (mask & 1 == 1).then(|| (self.grid.first_cube[brick + 1] - mask.count_ones()) as usize)
     }
 
     /// Finds the surface of every cube, through the samples in it and the 26 round it.
@@ -211,9 +199,8 @@ impl Level {
                 around.near(grid, brick, bit, 1, &mut near);
                 window.clear();
                 for &(step, near) in &near {
-                    const SHARES: [f32; 4] = [1.0, NEXT, NEXT * NEXT, NEXT * NEXT * NEXT];
-                    let share = SHARES[step.abs().element_sum() as usize];
-                    window.add(&self.samples, range(&self.sample_end, near), step, share);
+                    let shares = 1.0 - (1.0 - NEXT) * step.abs();
+                    window.add(&self.samples, range(&self.sample_end, near), step, shares.element_product());
                 }
                 // SAFETY: once for each cube.
                 unsafe { surfaces.write(cube, window.fit().unwrap_or(Surface::NONE)) };

@@ -15,13 +15,13 @@ mod vote;
 use crate::error::Error;
 use crate::lattice::{self, Lattice};
 use crate::normals::{Found, Normals};
-use crate::points::{Points, reserve};
+use crate::points::Points;
 use crate::progress::{Progress, Stage};
-use choose::choose;
+use choose::{Chosen, choose};
 use glam::{IVec3, Vec3};
 use level::Level;
 use std::ops::Range;
-use vote::{Vote, quantile};
+use vote::{Vote, median};
 
 /// Normals, and what was decided.
 pub(crate) struct Adaptive {
@@ -61,7 +61,7 @@ pub(crate) fn normals(
     lap: &mut dyn FnMut(&'static str),
 ) -> Result<Adaptive, Error> {
     let origin = lattice.locate(middle).map_or(IVec3::ZERO, |(brick, _)| brick);
-    let base = Level::new(points, lattice, lattice.in_edges(origin), None, &progress.stage("sort", 0.06..0.3))?;
+    let base = Level::new(points, *lattice, None, &progress.stage("sort", 0.06..0.3))?;
     lap("sort");
     let normals = Normals::new(points.len(), base.grid.placed.len(), curvature)?;
     let mut levels = vec![base];
@@ -71,10 +71,10 @@ pub(crate) fn normals(
         let part = stage.part(halving(i as i32));
         let last = levels.len() - 1;
         levels[last].fit(&part.part(0.0..0.5))?;
-        if i > DOUBLINGS || levels[last].lattice.size.max_element() <= 2.0 {
+        if i > DOUBLINGS || levels[last].lattice.size().max_element() <= 2.0 {
             break;
         }
-        let coarser = levels[last].coarser(&part.part(0.5..1.0))?;
+        let coarser = levels[last].coarser(origin >> last as i32, &part.part(0.5..1.0))?;
         levels.push(coarser);
         if last > 0 {
             levels[last].release();
@@ -85,7 +85,10 @@ pub(crate) fn normals(
     lap("surfaces");
 
     let mut run = Run { points, normals: &normals, cubes: 0, surfaces: 0, chosen_by: [0; SIZES] };
-    let (rough, noise) = run.settle(&levels, 0, &progress.stage("vote", 0.5..0.6))?;
+    let (rough, chosen) = run.settle(&levels, 0, &progress.stage("vote", 0.5..0.6))?;
+    let noises: Vec<f32> = chosen.iter().filter(|chosen| chosen.is_some()).map(|chosen| chosen.noise).collect();
+    let noise = f64::from(median(&noises)).sqrt();
+    drop((chosen, noises));
     lap("vote");
     run.divide(&mut levels, 0, &rough, &progress.stage("detail", 0.6..1.0))?;
     progress.update("detail", 1.0)?;
@@ -110,23 +113,20 @@ struct Run<'a> {
 
 impl Run<'_> {
     /// Finds the normals of all points in the smallest cubes, the last of the levels, but not in those that are to be
-    /// divided: answers which are, and the deviation of the points that half of the surfaces do not exceed.
-    fn settle(&mut self, levels: &[Level], division: usize, stage: &Stage) -> Result<(Vec<bool>, f64), Error> {
+    /// divided: answers which are, and what was chosen for each.
+    fn settle(&mut self, levels: &[Level], division: usize, stage: &Stage) -> Result<(Vec<bool>, Vec<Chosen>), Error> {
         let level = &levels[levels.len() - 1];
         let chosen = choose(levels, &stage.part(0.0..0.4))?;
         let vote = Vote { level, chosen: &chosen, is_last: division == DIVISIONS, normals: self.normals };
         let (rough, counts) = vote.run(&stage.part(0.4..1.0))?;
-        let mut noises = Vec::new();
-        reserve(&mut noises, chosen.len(), "the surfaces")?;
-        for (cube, chosen) in chosen.iter().enumerate().filter(|&(cube, _)| level.is_wanted(cube)) {
-            self.cubes += u64::from(!rough[cube]);
-            self.surfaces += u64::from(!rough[cube] && chosen.is_some());
-            noises.extend(chosen.is_some().then_some(chosen.noise));
+        for (_, chosen) in chosen.iter().enumerate().filter(|&(cube, _)| level.is_wanted(cube) && !rough[cube]) {
+            self.cubes += 1;
+            self.surfaces += u64::from(chosen.is_some());
         }
         for (all, count) in self.chosen_by[DIVISIONS - division..].iter_mut().zip(counts) {
             *all += count;
         }
-        Ok((rough, f64::from(quantile(&noises, 0.5)).sqrt()))
+        Ok((rough, chosen))
     }
 
     /// Divides the rough ones of the smallest cubes, some at a time, so that a cloud that is rough everywhere takes hardly
@@ -137,20 +137,16 @@ impl Run<'_> {
         while start < rough.len() {
             let level = &levels[levels.len() - 1];
             let (mut end, mut points) = (start, 0);
-            let mut some = Vec::new();
-            reserve(&mut some, rough.len(), "the cubes")?;
-            some.resize(rough.len(), false);
             while end < rough.len() && points < most {
-                some[end] = rough[end];
                 points += if rough[end] { level.points(end).len() } else { 0 };
                 end += 1;
             }
             if points > 0 {
                 let total = rough.len() as f64;
                 let stage = stage.part(start as f64 / total..end as f64 / total);
-                let finer = level.divided(&some, self.points, &stage.part(0.0..0.3))?;
+                let finer = level.divided(rough, start..end, self.points, &stage.part(0.0..0.3))?;
                 levels.push(finer);
-                let (rough, _) = self.settle(levels, division + 1, &stage.part(0.3..0.5))?;
+                let rough = self.settle(levels, division + 1, &stage.part(0.3..0.5))?.0;
                 self.divide(levels, division + 1, &rough, &stage.part(0.5..1.0))?;
                 levels.pop();
             }

@@ -3,7 +3,7 @@
 use super::surface::Matrix;
 use crate::error::Error;
 use crate::parallel::Filling;
-use glam::{Vec3, Vec4};
+use glam::{DVec3, Mat4, Vec3, Vec4};
 use std::ops::Range;
 
 /// One sample.
@@ -26,21 +26,25 @@ impl Sample {
         Self { place, points: self.points, spread: self.spread.scaled(0.25) }
     }
 
-    /// The sample that stands for others.
+    /// The sample that stands for others. Adds in double precision: there may be any number of them.
     #[inline(always)]
     pub fn of(others: impl Iterator<Item = Self> + Clone) -> Self {
-        let (mut points, mut sum) = (0.0, Vec3::ZERO);
+        let (mut points, mut sum) = (0.0, DVec3::ZERO);
         for other in others.clone() {
-            points += other.points;
-            sum += other.points * other.place;
+            points += f64::from(other.points);
+            sum += (other.points * other.place).as_dvec3();
         }
-        let place = sum / points;
-        let mut spread = Matrix::default();
+        let place = (sum / points).as_vec3();
+        let (mut diagonal, mut off) = (DVec3::ZERO, DVec3::ZERO);
         for other in others {
             let d = other.place - place;
-            spread = spread.plus(Matrix::product(d, d).plus(other.spread).scaled(other.points));
+            let spread = Matrix::product(d, d).plus(other.spread).scaled(other.points);
+            diagonal += spread.diagonal.as_dvec3();
+            off += spread.off.as_dvec3();
         }
-        Self { place, points, spread: spread.scaled(1.0 / points) }
+        let share = 1.0 / points;
+        let spread = Matrix { diagonal: (diagonal * share).as_vec3(), off: (off * share).as_vec3() };
+        Self { place, points: points as f32, spread }
     }
 }
 
@@ -208,6 +212,36 @@ impl Window {
                 *sum += term;
             }
         }
-        sums.map(|sum| f64::from(sum.element_sum()))
+        let mut totals = [0.0; N];
+        for (totals, sums) in totals.chunks_mut(4).zip(sums.chunks(4)) {
+            let [a, b, c, d] = transposed(std::array::from_fn(|i| sums.get(i).copied().unwrap_or(Vec4::ZERO)));
+            let four = (a + b) + (c + d);
+            totals.iter_mut().zip(four.to_array()).for_each(|(total, sum)| *total = f64::from(sum));
+        }
+        totals
+    }
+}
+
+/// Rows for columns.
+#[inline(always)]
+pub(super) fn transposed([a, b, c, d]: [Vec4; 4]) -> [Vec4; 4] {
+    let Mat4 { x_axis, y_axis, z_axis, w_axis } = Mat4::from_cols(a, b, c, d).transpose();
+    [x_axis, y_axis, z_axis, w_axis]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Single precision counts by ones to 2^24 only.
+    #[test]
+    fn a_sample_may_stand_for_any_number_of_points() {
+        let corners = [Vec3::new(0.4, 0.3, 0.1), Vec3::new(0.1, 0.3, 0.2), Vec3::new(0.3, 0.2, 0.4)];
+        let sample = |count: usize| Sample::of(corners.into_iter().cycle().take(count).map(Sample::point));
+        let (few, many) = (sample(3), sample(18_000_000));
+        assert_eq!(many.points, 18e6);
+        assert!(few.place.distance(many.place) < 1e-6, "{} {}", few.place, many.place);
+        let (a, b) = (few.spread, many.spread);
+        assert!(a.diagonal.distance(b.diagonal).max(a.off.distance(b.off)) < 1e-6, "{a:?} {b:?}");
     }
 }

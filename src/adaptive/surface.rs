@@ -2,16 +2,24 @@
 
 use super::samples::Window;
 use crate::pca::Symmetric;
+use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3, Vec4};
 
 /// A symmetric matrix: xx, yy, zz and yz, xz, xy.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub(super) struct Matrix {
     pub diagonal: Vec3,
     pub off: Vec3,
 }
 
 impl Matrix {
+    /// In four lanes.
+    #[inline(always)]
+    pub fn splat(&self) -> [[Vec4; 3]; 2] {
+        [self.diagonal, self.off].map(|vector| vector.to_array().map(Vec4::splat))
+    }
+
     /// The product with a vector.
     #[inline(always)]
     pub fn times(&self, p: Vec3) -> Vec3 {
@@ -41,9 +49,22 @@ impl Matrix {
     }
 }
 
+/// The product of matrices, their diagonals and what is off them, with vectors, lane by lane.
+#[inline(always)]
+pub(super) fn times_lanes([d, o]: [[Vec4; 3]; 2], [x, y, z]: [Vec4; 3]) -> [Vec4; 3] {
+    [d[0] * x + o[2] * y + o[1] * z, o[2] * x + d[1] * y + o[0] * z, o[1] * x + o[0] * y + d[2] * z]
+}
+
+/// The product of vectors, lane by lane.
+#[inline(always)]
+pub(super) fn dot_lanes(a: [Vec4; 3], b: [Vec4; 3]) -> Vec4 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
 /// The zeros of `height + slope . d + d . bend d / 2`, where `d` is what lies between `centre` and a point: near them its
 /// value is the distance from the surface, and its gradient the normal.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
 pub(super) struct Quadric {
     pub centre: Vec3,
     pub height: f32,
@@ -52,6 +73,13 @@ pub(super) struct Quadric {
 }
 
 impl Quadric {
+    pub const NONE: Self = Self {
+        centre: Vec3::ZERO,
+        height: 0.0,
+        slope: Vec3::ZERO,
+        bend: Matrix { diagonal: Vec3::ZERO, off: Vec3::ZERO },
+    };
+
     /// The gradient and the value at a point.
     #[inline(always)]
     pub fn at(&self, point: Vec3) -> (Vec3, f32) {
@@ -62,7 +90,7 @@ impl Quadric {
 }
 
 /// A surface, in the edges of its cube and against that cube's centre.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Surface {
     pub quadric: Quadric,
     /// Variance of the points' distances from it.
@@ -85,12 +113,7 @@ pub(super) struct Surface {
 
 impl Surface {
     pub const NONE: Self = Self {
-        quadric: Quadric {
-            centre: Vec3::ZERO,
-            height: 0.0,
-            slope: Vec3::ZERO,
-            bend: Matrix { diagonal: Vec3::ZERO, off: Vec3::ZERO },
-        },
+        quadric: Quadric::NONE,
         noise: 0.0,
         error: f32::INFINITY,
         error_growth: 0.0,
@@ -134,9 +157,10 @@ impl Window {
             return None;
         }
         let [points, total, x, y, z, xx, yy, zz, yz, xz, xy] = self.moments();
-        let mean = DVec3::new(x, y, z) / total;
-        let diagonal = DVec3::new(xx, yy, zz) / total - mean * mean;
-        let off = DVec3::new(yz, xz, xy) / total - DVec3::new(mean.y * mean.z, mean.x * mean.z, mean.x * mean.y);
+        let share = 1.0 / total;
+        let mean = DVec3::new(x, y, z) * share;
+        let diagonal = DVec3::new(xx, yy, zz) * share - mean * mean;
+        let off = DVec3::new(yz, xz, xy) * share - DVec3::new(mean.y * mean.z, mean.x * mean.z, mean.x * mean.y);
         let covariance = Symmetric { diagonal, off };
         let normal = covariance.normal(covariance.smallest_eigenvalue(), 1.0)?;
         let (u, v, [along, across, thick]) = principal(&covariance, normal);
@@ -152,9 +176,9 @@ impl Window {
             quadric: Quadric { centre: mean, height: 0.0, slope: normal, bend: Matrix::default() },
             noise: (thick * count / (count - 3.0).max(1.0)) as f32,
             width: across as f32,
-            variation: (thick / (along + across + thick)) as f32,
+            variation: (thick / (along + across + thick)).min(1.0 / 3.0) as f32,
             points: points as f32,
-            ..Surface::default()
+            ..Surface::NONE
         };
         if count >= QUADRIC_SAMPLES
             && let Some(fit) = self.quadratic(mean, [u, v, normal], [along, across], total)
@@ -170,10 +194,12 @@ impl Window {
                 slope: slope * scale,
                 bend: bend.scaled(-scale),
             };
-            let within = self.within(&surface.quadric, total);
             let residual = fit.residual * count / (count - 6.0);
-            let noise = residual + within;
+            let mut noise = residual;
+            // Else each sample is one point.
             if points > count {
+                let within = self.within(&surface.quadric, total);
+                noise += within;
                 // Lack of fit: the variance of a point, told by the samples' distances and by the spread in each.
                 let between = residual * points / count;
                 let own = within * points / (points - count);
@@ -190,6 +216,7 @@ impl Window {
         } else {
             let variance = f64::from(surface.noise).max(1e-14 * along) / points * thickness;
             surface.error = (variance * (1.0 / along + 1.0 / across) + PLANE_ERROR + strip_error) as f32;
+            surface.lacks_detail = points > count;
         }
         Some(surface)
     }
@@ -227,8 +254,9 @@ impl Window {
                 wh * h,
             ]
         });
+        let share = 1.0 / total;
         let [u1, v1, uu, uv, vv, uuu, uuv, uvv, vvv, u4, u3v, uuvv, uv3, v4, h, hu, hv, huu, huv, hvv, hh] =
-            sums.map(|sum| sum / total);
+            sums.map(|sum| sum * share);
         let mut matrix = [
             [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
             [u1, uu, 0.0, 0.0, 0.0, 0.0],
@@ -240,24 +268,20 @@ impl Window {
         let right = [h, hu, hv, huu, huv, hvv];
         let (mut coefficients, mut variances) = solve(&mut matrix, right)?;
         let explained: f64 = coefficients.iter().zip(right).map(|(c, r)| c * r).sum();
-        let [u, v] = unit;
+        let [u, v] = unit.map(|unit| 1.0 / unit);
         for (i, unit) in [1.0, u, v, u * u, u * v, v * v].into_iter().enumerate() {
-            coefficients[i] /= unit;
-            variances[i] /= unit * unit;
+            coefficients[i] *= unit;
+            variances[i] *= unit * unit;
         }
         Some(Fit { coefficients, variances, residual: (hh - explained).max(0.0) })
     }
 
     /// The mean variance, across the surface, of the points behind the samples.
     fn within(&self, quadric: &Quadric, total: f64) -> f64 {
-        let Quadric { centre, slope, bend: Matrix { diagonal: d, off: o }, .. } = *quadric;
+        let Quadric { centre, slope, bend, .. } = *quadric;
         let sum = self.sum_spread(|[x, y, z, _]| {
-            let (x, y, z) = (x - centre.x, y - centre.y, z - centre.z);
-            [
-                d.x * x + o.z * y + o.y * z + slope.x,
-                o.z * x + d.y * y + o.x * z + slope.y,
-                o.y * x + o.x * y + d.z * z + slope.z,
-            ]
+            let [x, y, z] = times_lanes(bend.splat(), [x - centre.x, y - centre.y, z - centre.z]);
+            [x + slope.x, y + slope.y, z + slope.z]
         });
         // Rounding may leave less than nothing.
         (sum / total).max(0.0)

@@ -4,7 +4,8 @@ use super::SIZES;
 use super::around::Around;
 use super::choose::Chosen;
 use super::level::Level;
-use super::surface::{Matrix, Quadric};
+use super::samples::transposed;
+use super::surface::{dot_lanes, times_lanes};
 use crate::error::Error;
 use crate::grid::Placed;
 use crate::lattice::cube_centre;
@@ -18,20 +19,17 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 /// How far a surface speaks, in edges: the deviation of a normal distribution.
 const SPEAK: f32 = 1.4;
 
-/// No surface is trusted more than to so many radians.
-const ANGLE_FLOOR: f32 = 0.001;
+/// No surface is trusted more than to a thousandth of a radian, squared.
+const ANGLE_FLOOR: f32 = 1e-6;
 
-/// Nor lies nearer to a point than so many edges.
-const DISTANCE_FLOOR: f32 = 0.0003;
+/// Nor lies nearer to a point than 0.0003 edges, squared.
+const DISTANCE_FLOOR: f32 = 9e-8;
 
 /// Where all normals round a cube agree within so many radians, and the sum of their deviations, nothing needs a vote.
 const SMOOTH: f32 = 0.05;
 
 /// Cubes whose surface rests on fewer points are not divided: the surfaces of the halves would rest on a quarter of them.
 const DIVIDED_POINTS: f32 = 60.0;
-
-/// The share of the surfaces that are taken for undisturbed: the noise of the worst of them is that of the place.
-const UNDISTURBED: f32 = 0.25;
 
 /// The square angle that a misfit of the size of the neighbourhood is taken for.
 const MISFIT: f32 = 2.0;
@@ -53,79 +51,123 @@ impl Vote<'_> {
     /// which are.
     #[inline(never)]
     pub fn run(&self, stage: &Stage) -> Result<(Vec<bool>, Counts), Error> {
-        let Self { level, chosen, is_last, normals } = *self;
-        let grid = &level.grid;
+        let level = self.level;
         let rough = Filling::new(level.cubes(), "the cubes")?;
         let counts = [const { AtomicU64::new(0) }; SIZES];
-        stage.run(grid.blocks.len(), &|block| {
-            let (mut around, mut near, mut voters) = (Around::new(), Vec::new(), Voters::default());
-            let mut resolved = 0;
-            for (brick, cube, bit) in grid.cubes_in(block) {
-                let mut is_rough = false;
-                if level.is_wanted(cube) {
-                    let (own, surface, placed) = (&chosen[cube], &level.surfaces[cube], level.points(cube));
-                    let centre = cube_centre(bit);
-                    let can_divide = !is_last && surface.points >= DIVIDED_POINTS;
-                    around.near(grid, brick, bit, 1, &mut near);
-                    let lacks_detail = can_divide && surface.lacks_detail;
-                    let smooth = if lacks_detail { None } else { Smooth::new(own, &near, chosen) };
-                    is_rough = can_divide && smooth.is_none();
-                    if !is_rough {
-                        if smooth.is_none() {
-                            around.near(grid, brick, bit, 2, &mut near);
-                            voters.invite(&near, chosen);
-                        }
-                        for four in placed.chunks(4) {
-                            let found = match &smooth {
-                                Some(smooth) => smooth.normals(four, centre),
-                                None => voters.normals(four, centre),
-                            };
-                            // SAFETY: every point of the input stands in one cube that is wanted and not divided.
-                            unsafe { normals.write_lanes(four.iter().map(|p| level.name(p)), found) };
-                        }
-                        if normals.has_curvature() {
-                            for p in placed {
-                                // SAFETY: as above.
-                                unsafe { normals.write_curvature(level.name(p), own.variation) };
-                            }
-                        }
-                        let count = placed.len() as u64;
-                        if smooth.is_some() || !voters.voters.is_empty() {
-                            resolved += count;
-                        }
-                        if own.is_some() {
-                            counts[own.doublings as usize].fetch_add(count, Relaxed);
-                        }
-                    }
-                }
+        stage.run(level.grid.blocks.len(), &|block| {
+            let mut booth = Booth::new(self, &counts);
+            for (brick, cube, bit) in level.grid.cubes_in(block) {
                 // SAFETY: once for each cube.
-                unsafe { rough.write(cube, is_rough) };
+                unsafe { rough.write(cube, level.is_wanted(cube) && !booth.settle(brick, cube, bit)) };
             }
-            normals.add_resolved(resolved);
+            self.normals.add_resolved(booth.resolved);
         })?;
         // SAFETY: these were all cubes.
         Ok((unsafe { rough.complete() }, counts.map(AtomicU64::into_inner)))
     }
 }
 
-/// The value that a share of the values, none of them negative, do not exceed; infinite if there are none.
-pub(super) fn quantile(values: &[f32], share: f32) -> f32 {
-    let rank = (values.len() as f32 * share) as usize;
+/// Where one cube after the other is voted on.
+struct Booth<'a> {
+    vote: &'a Vote<'a>,
+    counts: &'a [AtomicU64; SIZES],
+    around: Around,
+    near: Vec<(Vec3, usize)>,
+    ballot: Ballot,
+    resolved: u64,
+}
+
+impl<'a> Booth<'a> {
+    fn new(vote: &'a Vote<'a>, counts: &'a [AtomicU64; SIZES]) -> Self {
+        Self { vote, counts, around: Around::new(), near: Vec::new(), ballot: Ballot::default(), resolved: 0 }
+    }
+
+    /// Finds the normals of the points of a cube, unless it is to be divided: answers whether it was settled.
+    #[optimize(size)]
+    #[inline(never)]
+    fn settle(&mut self, brick: usize, cube: usize, bit: u32) -> bool {
+        let Vote { level, chosen, is_last, normals } = *self.vote;
+        let (own, surface) = (&chosen[cube], &level.surfaces[cube]);
+        let can_divide = !is_last && surface.points >= DIVIDED_POINTS;
+        let mut smooth = None;
+        if own.is_some() && !(can_divide && surface.lacks_detail) {
+            self.around.near(&level.grid, brick, bit, 1, &mut self.near);
+            self.ballot.invite(&self.near, chosen, f32::INFINITY);
+            smooth = self.ballot.smooth(own.quadric.centre);
+        }
+        if smooth.is_none() {
+            if can_divide {
+                return false;
+            }
+            self.around.near(&level.grid, brick, bit, 2, &mut self.near);
+            let noises = self.near.iter().map(|(_, cube)| chosen[*cube].flat_noise);
+            self.ballot.invite(&self.near, chosen, quartile(noises));
+        }
+        let placed = level.points(cube);
+        for four in placed.chunks(4) {
+            let found = match &smooth {
+                Some(smooth) => smooth.normals(four, cube_centre(bit)),
+                None => self.ballot.normals(four, cube_centre(bit)),
+            };
+            // SAFETY: every point of the input stands in one cube that is wanted and not divided.
+            unsafe { normals.write_lanes(four.iter().map(|p| level.name(p)), found) };
+        }
+        if normals.has_curvature() {
+            for p in placed {
+                // SAFETY: as above.
+                unsafe { normals.write_curvature(level.name(p), own.variation) };
+            }
+        }
+        let count = placed.len() as u64;
+        if !self.ballot.voters.is_empty() {
+            self.resolved += count;
+        }
+        if own.is_some() {
+            self.counts[own.doublings as usize].fetch_add(count, Relaxed);
+        }
+        true
+    }
+}
+
+/// The median of some values, none of them negative; infinite if there are none.
+pub(super) fn median(values: &[f32]) -> f32 {
     // Bit by bit: the bits of numbers that are not negative are in the order of the numbers.
     let mut bits = 0u32;
     for bit in (0..31).rev() {
         let more = bits | 1 << bit;
-        if values.iter().filter(|value| value.to_bits() < more).count() <= rank {
+        if values.iter().filter(|value| value.to_bits() < more).count() <= values.len() / 2 {
             bits = more;
         }
     }
     if values.is_empty() { f32::INFINITY } else { f32::from_bits(bits) }
 }
 
-/// `exp(-x)`, nearly: the same bits everywhere.
+/// The value that a quarter of at most 125 values do not exceed; infinite if fewer than four are finite, and only these
+/// count.
+fn quartile(values: impl Iterator<Item = f32> + Clone) -> f32 {
+    let rank = values.clone().filter(|value| *value < f32::INFINITY).count() / 4;
+    if rank == 0 {
+        return f32::INFINITY;
+    }
+    // The least so far, in their order.
+    let mut least = [f32::INFINITY; 32];
+    for value in values {
+        let mut place = rank;
+        while place > 0 && least[place - 1] > value {
+            least[place] = least[place - 1];
+            place -= 1;
+        }
+        if least[place] > value {
+            least[place] = value;
+        }
+    }
+    least[rank]
+}
+
+/// `exp(-x)`, nearly: the same bits everywhere. Zero from some 4000.
 #[inline(always)]
-fn fade(x: f32) -> f32 {
-    let mut power = 1.0 / (1.0 + x * (1.0 / 16.0));
+fn fade(x: Vec4) -> Vec4 {
+    let mut power = Vec4::ONE / (1.0 + x * (1.0 / 16.0));
     for _ in 0..4 {
         power *= power;
     }
@@ -135,153 +177,209 @@ fn fade(x: f32) -> f32 {
 /// The normal of a cube where all surfaces agree, as a linear function.
 struct Smooth {
     centre: Vec3,
-    normal: Vec3,
-    turn: Matrix,
+    normal: [Vec4; 3],
+    turn: [[Vec4; 3]; 2],
 }
 
 impl Smooth {
-    #[optimize(size)]
-    #[inline(never)]
-    fn new(own: &Chosen, near: &[(Vec3, usize)], chosen: &[Chosen]) -> Option<Self> {
-        if !own.is_some() {
-            return None;
-        }
-        let centre = own.quadric.centre;
-        let mut voices = [(0.0, Vec3::ZERO, 0.0, &own.quadric.bend, 1.0); 27];
-        let (mut count, mut best) = (0, 0);
-        for &(step, cube) in near {
-            let other = &chosen[cube];
-            if !other.is_some() {
-                continue;
-            }
-            let place = centre - step;
-            let (slope, height) = other.quadric.at(place);
-            let scale = slope.length_recip();
-            let distance = height * scale;
-            let far = (place - other.quadric.centre).length_squared() / (2.0 * SPEAK * SPEAK)
-                + distance * distance / (2.0 * (other.noise + DISTANCE_FLOOR * DISTANCE_FLOOR));
-            let weight = fade(far) / (other.error + ANGLE_FLOOR * ANGLE_FLOOR);
-            voices[count] = (weight, slope * scale, other.error.sqrt(), &other.quadric.bend, scale);
-            if weight > voices[best].0 {
-                best = count;
-            }
-            count += 1;
-        }
-        let (_, normal, deviation, ..) = voices[best];
-        let mut smooth = Self { centre, normal: Vec3::ZERO, turn: Matrix::default() };
-        for (weight, other, other_deviation, bend, scale) in &voices[..count] {
-            let cosine = normal.dot(*other);
-            let limit = SMOOTH + deviation + other_deviation;
-            if 1.0 - cosine * cosine > limit * limit {
-                return None;
-            }
-            let weight = if cosine < 0.0 { -weight } else { *weight };
-            smooth.normal += weight * *other;
-            smooth.turn = smooth.turn.plus(bend.scaled(weight * scale));
-        }
-        let scale = smooth.normal.length_recip();
-        Some(Self { centre, normal: smooth.normal * scale, turn: smooth.turn.scaled(scale) })
-    }
-
     /// The normals of up to four points.
     #[inline(never)]
     fn normals(&self, points: &[Placed], cube: Vec3) -> [Vec4; 3] {
-        let local = |i: usize| points[i.min(points.len() - 1)].local;
+        let local = |i: usize| points[i.min(points.len() - 1)].local - (self.centre + cube);
         let (a, b, c, d) = (local(0), local(1), local(2), local(3));
-        let from = self.centre + cube;
-        let x = Vec4::new(a.x, b.x, c.x, d.x) - from.x;
-        let y = Vec4::new(a.y, b.y, c.y, d.y) - from.y;
-        let z = Vec4::new(a.z, b.z, c.z, d.z) - from.z;
-        let (n, d, o) = (self.normal, self.turn.diagonal, self.turn.off);
-        let nx = n.x + d.x * x + o.z * y + o.y * z;
-        let ny = n.y + o.z * x + d.y * y + o.x * z;
-        let nz = n.z + o.y * x + o.x * y + d.z * z;
-        let scale = Vec4::ONE / (nx * nx + ny * ny + nz * nz).sqrt();
-        [nx * scale, ny * scale, nz * scale]
+        let places = [Vec4::new(a.x, b.x, c.x, d.x), Vec4::new(a.y, b.y, c.y, d.y), Vec4::new(a.z, b.z, c.z, d.z)];
+        let turns = times_lanes(self.turn, places);
+        let normals: [Vec4; 3] = std::array::from_fn(|axis| self.normal[axis] + turns[axis]);
+        let scale = Vec4::ONE / dot_lanes(normals, normals).sqrt();
+        normals.map(|lanes| lanes * scale)
     }
 }
 
-/// A surface that speaks for points of a cube.
-struct Voter {
-    quadric: Quadric,
-    /// How much it is worth.
-    weight: f32,
+/// Four surfaces that speak for the points of a cube, lane by lane; where there are fewer, the last ones weigh nothing.
+struct Voters {
+    centre: [Vec4; 3],
+    height: Vec4,
+    slope: [Vec4; 3],
+    bend: [[Vec4; 3]; 2],
+    /// Variance of the angle of the normal.
+    error: Vec4,
+    /// How much each is worth.
+    weight: Vec4,
     /// Of a square distance from it.
-    fall: f32,
+    fall: Vec4,
+}
+
+impl Voters {
+    /// Each comes with what lies between its cube and the one where it votes. `reference` is the noise of that place.
+    #[inline(always)]
+    fn of(four: [(Vec3, &Chosen); 4], reference: f32) -> Self {
+        let numbers = four.map(|(_, chosen)| chosen.numbers());
+        let lanes = |i: usize| transposed(numbers.map(|numbers| numbers[i]));
+        let [cx, cy, cz, height] = lanes(0);
+        let [sx, sy, sz, xx] = lanes(1);
+        let [yy, zz, yz, xz] = lanes(2);
+        let [xy, noise, chance, error] = lanes(3);
+        let [width, ..] = lanes(4);
+        let [a, b, c, d] = four.map(|(step, _)| step);
+        let centre = [
+            cx + Vec4::new(a.x, b.x, c.x, d.x),
+            cy + Vec4::new(a.y, b.y, c.y, d.y),
+            cz + Vec4::new(a.z, b.z, c.z, d.z),
+        ];
+        let misfit = (noise - reference * (1.0 + chance) - DISTANCE_FLOOR).max(Vec4::ZERO);
+        Self {
+            centre,
+            height,
+            slope: [sx, sy, sz],
+            bend: [[xx, yy, zz], [yz, xz, xy]],
+            error,
+            weight: 1.0 / (error + ANGLE_FLOOR + MISFIT * misfit / width),
+            fall: 0.5 / (noise + DISTANCE_FLOOR),
+        }
+    }
+
+    /// What they say about a point.
+    #[inline(always)]
+    fn speak(&self, point: Vec3) -> Votes {
+        let place = point.to_array().map(Vec4::splat);
+        let d = std::array::from_fn(|axis| place[axis] - self.centre[axis]);
+        let bend = times_lanes(self.bend, d);
+        let slope: [Vec4; 3] = std::array::from_fn(|axis| self.slope[axis] + bend[axis]);
+        let height = self.height + dot_lanes(d, self.slope) + 0.5 * dot_lanes(d, bend);
+        let square = dot_lanes(slope, slope).max(Vec4::splat(f32::MIN_POSITIVE));
+        let far = dot_lanes(d, d) * (0.5 / (SPEAK * SPEAK)) + self.fall * height * height / square;
+        let scale = Vec4::ONE / square.sqrt();
+        Votes { weight: fade(far) * self.weight, normal: slope.map(|lanes| lanes * scale), scale }
+    }
+}
+
+/// Four votes on the normal at a point, lane by lane.
+struct Votes {
+    weight: Vec4,
+    normal: [Vec4; 3],
+    /// What makes a unit vector of the gradient.
+    scale: Vec4,
+}
+
+/// The vote that counts most.
+struct Best {
+    weight: f32,
+    normal: Vec3,
+    /// The centre of the surface.
+    centre: Vec3,
+    /// Variance of the angle of the normal.
+    error: f32,
 }
 
 /// The surfaces that vote in a cube.
 #[derive(Default)]
-struct Voters {
-    voters: Vec<Voter>,
-    noises: Vec<f32>,
-    votes: Vec<(f32, Vec3)>,
+struct Ballot {
+    voters: Vec<Voters>,
+    /// What they say about the point that was asked about last.
+    votes: Vec<Votes>,
 }
 
-impl Voters {
-    /// Those within two cubes.
-    #[optimize(size)]
+impl Ballot {
+    /// Asks the surfaces of some cubes, and trusts those less that are noisier than `reference`.
     #[inline(never)]
-    fn invite(&mut self, near: &[(Vec3, usize)], chosen: &[Chosen]) {
-        self.noises.clear();
-        let flat = near.iter().map(|(_, cube)| &chosen[*cube]).filter(|other| other.is_flat);
-        self.noises.extend(flat.map(|other| other.noise));
-        let reference = if self.noises.len() < 4 { f32::INFINITY } else { quantile(&self.noises, UNDISTURBED) };
+    fn invite(&mut self, near: &[(Vec3, usize)], chosen: &[Chosen], reference: f32) {
         self.voters.clear();
-        let near = near.iter().filter(|(_, cube)| chosen[*cube].is_some());
-        self.voters.extend(near.map(|&(step, cube)| {
-            let other = &chosen[cube];
-            let floor = DISTANCE_FLOOR * DISTANCE_FLOOR;
-            let misfit = (other.noise - reference * (1.0 + other.chance) - floor).max(0.0);
-            let error = other.error + ANGLE_FLOOR * ANGLE_FLOOR + MISFIT * misfit / other.width;
-            Voter {
-                quadric: Quadric { centre: other.quadric.centre + step, ..other.quadric },
-                weight: 1.0 / error,
-                fall: 0.5 / (other.noise + floor),
+        let mut all = near.iter().map(|&(step, cube)| (step, &chosen[cube])).filter(|(_, other)| other.is_some());
+        while let Some(first) = all.next() {
+            let mut next = || all.next().unwrap_or((Vec3::ZERO, &Chosen::NONE));
+            self.voters.push(Voters::of([first, next(), next(), next()], reference));
+        }
+    }
+
+    /// Asks about a point. The vote that counts most, if there are any.
+    #[inline(never)]
+    fn ask(&mut self, point: Vec3) -> Best {
+        self.votes.clear();
+        // Lane by lane: the weight, and what else is to be told.
+        let mut most =
+            [Vec4::NEG_ONE, Vec4::ZERO, Vec4::ZERO, Vec4::ZERO, Vec4::ZERO, Vec4::ZERO, Vec4::ZERO, Vec4::ZERO];
+        for voters in &self.voters {
+            let votes = voters.speak(point);
+            let ([x, y, z], [a, b, c]) = (votes.normal, voters.centre);
+            let is_more = votes.weight.cmpgt(most[0]);
+            for (most, new) in most.iter_mut().zip([votes.weight, x, y, z, a, b, c, voters.error]) {
+                *most = Vec4::select(is_more, new, *most);
             }
-        }));
+            self.votes.push(votes);
+        }
+        let lane = most[0].max_position();
+        let [weight, x, y, z, a, b, c, error] = most.map(|lanes| lanes[lane]);
+        Best { weight, normal: Vec3::new(x, y, z), centre: Vec3::new(a, b, c), error }
+    }
+
+    /// One linear function for all points of a cube, if about its centroid all voters agree.
+    #[inline(never)]
+    fn smooth(&mut self, centre: Vec3) -> Option<Smooth> {
+        let best = self.ask(centre);
+        if best.weight < f32::MIN_POSITIVE {
+            // Far from all of them.
+            return None;
+        }
+        let normal = best.normal.to_array().map(Vec4::splat);
+        let deviation = SMOOTH + best.error.sqrt();
+        let mut sums = [Vec4::ZERO; 9];
+        for (votes, voters) in self.votes.iter().zip(&self.voters) {
+            let cosine = dot_lanes(normal, votes.normal);
+            let limit = deviation + voters.error.sqrt();
+            if (1.0 - cosine * cosine).cmpgt(limit * limit).any() {
+                return None;
+            }
+            let weight = votes.weight / best.weight;
+            let weight = Vec4::select(cosine.cmplt(Vec4::ZERO), -weight, weight);
+            let (scaled, [diagonal, off]) = (weight * votes.scale, voters.bend);
+            for axis in 0..3 {
+                sums[axis] += weight * votes.normal[axis];
+                sums[3 + axis] += scaled * diagonal[axis];
+                sums[6 + axis] += scaled * off[axis];
+            }
+        }
+        let [x, y, z, xx, yy, zz, yz, xz, xy] = sums.map(Vec4::element_sum);
+        let length = Vec3::new(x, y, z).length();
+        let lanes = |values: [f32; 3]| values.map(|value| Vec4::splat(value / length));
+        Some(Smooth { centre, normal: lanes([x, y, z]), turn: [lanes([xx, yy, zz]), lanes([yz, xz, xy])] })
     }
 
     /// The normals of up to four points.
     fn normals(&mut self, points: &[Placed], cube: Vec3) -> [Vec4; 3] {
-        let mut normals = [[0.0; 4]; 3];
+        let mut normals = [Vec4::ZERO; 3];
         for (i, p) in points.iter().enumerate().take(4) {
-            let normal = self.vote(p.local - cube);
-            [normals[0][i], normals[1][i], normals[2][i]] = normal.to_array();
+            let normal = self.vote(p.local - cube).to_array();
+            normals.iter_mut().zip(normal).for_each(|(lanes, value)| lanes.as_mut()[i] = value);
         }
-        normals.map(Vec4::from_array)
+        normals
     }
 
     /// The normal at a point.
     #[inline(never)]
     fn vote(&mut self, point: Vec3) -> Vec3 {
-        self.votes.clear();
-        let mut best = 0;
-        for (i, voter) in self.voters.iter().enumerate() {
-            let (slope, height) = voter.quadric.at(point);
-            let square = slope.length_squared();
-            let far = point.distance_squared(voter.quadric.centre) / (2.0 * SPEAK * SPEAK)
-                + voter.fall * height * height / square;
-            self.votes.push((fade(far) * voter.weight, slope / square.sqrt()));
-            if self.votes[i].0 > self.votes[best].0 {
-                best = i;
-            }
+        let best = self.ask(point);
+        if best.weight < f32::MIN_POSITIVE {
+            return best.normal;
         }
-        let Some(&(_, normal)) = self.votes.get(best) else { return Vec3::ZERO };
-        let from = self.voters[best].quadric.centre;
-        let mut sum = Vec3::ZERO;
-        for ((weight, other), voter) in self.votes.iter().zip(&self.voters) {
-            let cosine = normal.dot(*other);
-            let side = if cosine.abs() > FRAC_1_SQRT_2 {
-                cosine
-            } else {
+        let normal = best.normal.to_array().map(Vec4::splat);
+        let centre = best.centre.to_array().map(Vec4::splat);
+        let mut sum = [Vec4::ZERO; 3];
+        for (votes, voters) in self.votes.iter().zip(&self.voters) {
+            let mut side = dot_lanes(normal, votes.normal);
+            let is_turned = side.abs().cmple(Vec4::splat(FRAC_1_SQRT_2));
+            if is_turned.any() {
                 // Round an edge: reflected at the plane between the two, as on an arc.
-                let across = (voter.quadric.centre - from).normalize_or_zero();
-                (normal - 2.0 * across.dot(normal) * across).dot(*other)
-            };
-            sum += if side < 0.0 { -*weight * *other } else { *weight * *other };
+                let across = std::array::from_fn(|axis| voters.centre[axis] - centre[axis]);
+                let reflected = dot_lanes(across, across) * side
+                    - 2.0 * dot_lanes(across, normal) * dot_lanes(across, votes.normal);
+                side = Vec4::select(is_turned, reflected, side);
+            }
+            let weight = votes.weight / best.weight;
+            let weight = Vec4::select(side.cmplt(Vec4::ZERO), -weight, weight);
+            (0..3).for_each(|axis| sum[axis] += weight * votes.normal[axis]);
         }
-        sum.try_normalize().unwrap_or(normal)
+        let sum = Vec3::from_array(sum.map(Vec4::element_sum));
+        sum.try_normalize().unwrap_or(best.normal)
     }
 }
 
@@ -290,20 +388,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quantiles_are_those_of_the_sorted_values() {
+    fn medians_and_quartiles_are_those_of_the_sorted_values() {
         let values: Vec<f32> = (0..101).map(|i| ((i * 37) % 101) as f32 * 1e-9).collect();
-        for share in [0.0, 0.25, 0.5, 0.9] {
-            assert_eq!(quantile(&values, share), (101.0 * share).floor() * 1e-9);
+        assert_eq!((median(&values), quartile(values.iter().copied())), (50.0 * 1e-9, 25.0 * 1e-9));
+        assert_eq!((median(&[3.5]), median(&[])), (3.5, f32::INFINITY));
+        for (some, expected) in
+            [(&[1.0, 2.0, 3.0][..], f32::INFINITY), (&[4.0, 2.0, 3.0, 1.0], 2.0), (&[2.0; 125], 2.0)]
+        {
+            assert_eq!(quartile(some.iter().copied()), expected);
         }
-        assert_eq!(quantile(&[3.5], 0.5), 3.5);
-        assert_eq!(quantile(&[], 0.5), f32::INFINITY);
     }
 
     #[test]
     fn fading_is_that_of_the_exponential_near_zero_and_never_less() {
         for x in [0.0f32, 0.01, 0.1, 0.5, 1.0] {
-            assert!((fade(x) / (-x).exp() - 1.0).abs() < 0.04, "{x}");
+            assert!((fade(Vec4::splat(x)).x / (-x).exp() - 1.0).abs() < 0.04, "{x}");
         }
+        let fade = |x: f32| fade(Vec4::splat(x)).x;
         for x in [2.0f32, 5.0, 20.0, 1e3, 1e30] {
             assert!(fade(x) >= (-x).exp() && fade(x) < fade(0.99 * x).max(1e-37), "{x}");
         }
