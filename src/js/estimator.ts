@@ -4,7 +4,7 @@ import { BilinormalError } from './error.js';
 import { detect } from './features.js';
 import type { Call, Link, Reply, Start, StartWorker } from './protocol.js';
 import { kindOf, own, resolve, want } from './source.js';
-import type { Estimator, EstimatorOptions, ReadOptions } from './types.js';
+import type { EstimateOptions, Estimator, EstimatorOptions, ReadOptions } from './types.js';
 
 /** What an estimator needs from where it runs. */
 export interface Host {
@@ -172,6 +172,11 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
   return { run, dispose };
 }
 
+/** Whether the core suffices, which knows no other method and no other cells. What is misspelt the full module refuses. */
+function isPlain({ method = 'bilinear', cell = 'auto', k, orient = 'none' }: EstimateOptions) {
+  return method === 'bilinear' && cell === 'auto' && k === undefined && orient === 'none';
+}
+
 /** An estimator that starts a worker when a call needs one, and a call that does no more than that. */
 export function openEstimator(host: Host, options: EstimatorOptions): [Estimator, () => Promise<unknown>] {
   const core = openQueue(host, options);
@@ -180,7 +185,7 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
   const full = openQueue(host, { ...options, full: true });
   const estimator: Estimator = {
     estimateNormals: (positions, options = {}) =>
-      (/knn|egg/.test(options?.method!) || typeof options?.cell === 'object' ? full : core).run(options, () => {
+      (isPlain(options ?? {}) ? core : full).run(options, () => {
         const kind = kindOf(positions);
         want(/^Float(32|64)Array$/.test(kind), 'positions', positions, 'a Float32Array or Float64Array');
         const { length } = positions;

@@ -12,6 +12,8 @@ const CELLS: &str = "'auto', { scale: number } or { size: number }";
 const ORIENTS: &str = "'none', 'consistent', 'outward', { viewpoint: [x, y, z] } or { up: [x, y, z] }";
 
 /// Reads the options; what is left out or `undefined` keeps its default. Ranges are the estimator's to check.
+///
+/// The core is asked only for what all have in common (`estimator.ts`).
 pub(super) fn parse(value: &JsValue) -> Result<Options, Error> {
     let mut options = Options::default();
     if value.is_undefined() {
@@ -25,17 +27,19 @@ pub(super) fn parse(value: &JsValue) -> Result<Options, Error> {
             return Err(Error::Input(format!("option '{name}' is unknown; wanted any of {}", NAMES.join(", "))));
         }
     }
-    if let Some(method) = given(value, "method") {
-        options.method = self::method(&method).ok_or_else(|| refusal("method", &method, METHODS))?;
-    }
-    if let Some(cell) = given(value, "cell") {
-        options.cell = self::cell(&cell).ok_or_else(|| refusal("cell", &cell, CELLS))?;
-    }
-    if let Some(k) = given(value, "k") {
-        options.k = Some(self::k(&k).ok_or_else(|| refusal("k", &k, "a whole number of at least 3"))?);
-    }
-    if let Some(orient) = given(value, "orient") {
-        options.orient = self::orient(&orient).ok_or_else(|| refusal("orient", &orient, ORIENTS))?;
+    if cfg!(feature = "full") {
+        if let Some(method) = given(value, "method") {
+            options.method = self::method(&method).ok_or_else(|| refusal("method", &method, METHODS))?;
+        }
+        if let Some(cell) = given(value, "cell") {
+            options.cell = self::cell(&cell).ok_or_else(|| refusal("cell", &cell, CELLS))?;
+        }
+        if let Some(k) = given(value, "k") {
+            options.k = Some(self::k(&k).ok_or_else(|| refusal("k", &k, "a whole number of at least 3"))?);
+        }
+        if let Some(orient) = given(value, "orient") {
+            options.orient = self::orient(&orient).ok_or_else(|| refusal("orient", &orient, ORIENTS))?;
+        }
     }
     if let Some(curvature) = given(value, "curvature") {
         options.curvature = curvature.as_bool().ok_or_else(|| refusal("curvature", &curvature, "true or false"))?;
