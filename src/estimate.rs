@@ -10,7 +10,6 @@ use crate::lattice::{CUBES, Lattice};
 use crate::nodes::{self, Node};
 use crate::normals::Found;
 use crate::options::{Cell, Method, Options};
-use crate::pca::Moments;
 use crate::points::{Bounds, Bulk, Points};
 use crate::progress::Progress;
 
@@ -20,9 +19,10 @@ pub struct Estimate {
     /// `nx0 ny0 nz0 nx1 ...`, one unit vector a point in the order of the input, or zero for an unresolved point.
     pub normals: Vec<f32>,
     /// If asked for, the surface variation `lambda3 / (lambda1 + lambda2 + lambda3)` of each point's neighbourhood, from 0
-    /// (flat) to 1/3 (Pauly, Gross and Kobbelt 2002); 0 for an unresolved point. The neighbourhood of a node is that of its
-    /// normal, the 27 cubes, and a point has the mean of its nodes, by the weights of its normal; for the baselines it
-    /// is the k nearest points, for [`Method::Egg`] together with the point itself.
+    /// (flat) to 1/3 (Pauly, Gross and Kobbelt 2002); 0 for an unresolved point. With [`Cell::Auto`] it is that of the 27
+    /// cubes of the size chosen for the point's cube, nearer ones counted more. With cubes of one size a node has that
+    /// of its 27 cubes, and a point the mean of its nodes, by the weights of its normal. For the baselines the
+    /// neighbourhood is the k nearest points, for [`Method::Egg`] together with the point itself.
     pub curvature: Option<Vec<f32>>,
     /// What was done.
     pub report: Report,
@@ -39,14 +39,14 @@ pub struct Report {
     pub cells: u64,
     /// Cubes that hold their node.
     pub nodes: u64,
-    /// Cubes along each axis of the bounding box, at most 2^30.
+    /// Cubes along each axis of the bounding box, at most 2^30; with [`Cell::Auto`] at most 2^22.
     pub grid: [u64; 3],
     /// Edge of a cube, in units of the input.
     pub cell_size: f64,
     /// Edge of a cube, in multiples of the paper's L (Eq. 1).
     pub scale: f64,
     /// How far the points lie off the surface, in units of the input: the deviation that half of the cubes of `cell_size`
-    /// do not exceed. Only [`Cell::Auto`] measures it.
+    /// do not exceed; 0 if there is no surface. Only [`Cell::Auto`] measures it.
     pub noise: Option<f64>,
     /// The sizes of the neighbourhoods that [`Cell::Auto`] chose, the smallest first.
     pub scales: Vec<Scale>,
@@ -95,7 +95,9 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
 
     match (options.method, options.cell) {
         (Method::Bilinear, Cell::Auto) => adaptive(points, options, &bounds, laps),
-        _ if !cfg!(feature = "full") => Err(Error::Unsupported("this module has only the automatic cell".into())),
+        _ if !cfg!(feature = "full") => {
+            Err(Error::Unsupported("this module has only method 'bilinear' with cell 'auto'".into()))
+        }
         (Method::Bilinear, cell) => bilinear(points, options, cell::edge(cell, points, &bounds)?, &bounds, laps),
         (Method::Knn, _) => {
             baseline(points, options, Baseline::Knn { k: options.k.unwrap_or(16) as usize }, &bounds, laps)
@@ -133,7 +135,7 @@ fn adaptive(points: &Points, options: &Options, bounds: &Bounds, mut laps: Laps)
     let mut report = describe(points, bounds, &lattice, &answer.found, laps);
     report.cells = answer.cubes;
     report.nodes = answer.surfaces;
-    report.noise = Some(answer.noise * report.cell_size).filter(|noise| noise.is_finite());
+    report.noise = Some(answer.noise * report.cell_size);
     let scale = |&(edges, points): &(f64, u64)| Scale { cell_size: edges * report.cell_size, points };
     report.scales = answer.scales.iter().map(scale).collect();
     report.nodes_used[0] = report.points;
@@ -147,7 +149,7 @@ fn bilinear(points: &Points, options: &Options, edge: f64, bounds: &Bounds, mut 
     progress.update("cellSize", 0.03)?;
     let lattice = Lattice::new(bounds, &|| Bulk::of_points(points).median, edge, CUBES);
     laps.end("cellSize");
-    let (grid, moments) = Grid::sort(points, &lattice, &progress.stage("sort", 0.06..0.55), Moments::of_cube)?;
+    let (grid, moments) = Grid::sort(points, &lattice, &progress.stage("sort", 0.06..0.55), nodes::moments)?;
     laps.end("sort");
     let stage = progress.stage("nodes", 0.55..0.65);
     let (nodes, variations) = nodes::nodes(&grid, &moments, options.curvature, &stage)?;

@@ -83,6 +83,12 @@ impl Grid {
         Ok(Self { bricks, masks, first_cube, first_point, cube_end: Vec::new(), placed, blocks })
     }
 
+    /// The number of the cube with bit `bit` of a brick; it must be occupied.
+    #[inline(always)]
+    pub fn cube(&self, brick: usize, bit: u32) -> u32 {
+        self.first_cube[brick] + (self.masks[brick] & ((1 << bit) - 1)).count_ones()
+    }
+
     /// How many cubes hold points.
     pub fn cubes(&self) -> usize {
         self.cube_end.len()

@@ -2,7 +2,7 @@
 
 use crate::bricks::set_bits;
 use crate::error::Error;
-use crate::grid::Grid;
+use crate::grid::{Grid, Placed};
 use crate::parallel::Filling;
 use crate::pca::{Moments, Plane};
 use crate::progress::Stage;
@@ -51,6 +51,11 @@ impl Node {
     pub fn is_good(&self) -> bool {
         self.position().abs().cmple(Vec4::splat(0.5)).bitmask() & 7 == 7
     }
+}
+
+/// The moments of a cube's points, against its centre.
+pub(crate) fn moments(points: &[Placed], centre: Vec3) -> Moments {
+    Moments::of(points.iter().map(|point| point.local - centre))
 }
 
 /// The node of every cube, in the order of the grid; with `curvature` also the surface variation of its points, 0 without
@@ -117,7 +122,7 @@ mod tests {
             let lattice = Lattice::new(&bounds, &|| DVec3::ZERO, edge, CUBES);
             let progress = Progress::silent();
             let stage = progress.stage("test", 0.0..1.0);
-            let (grid, moments) = Grid::sort(&points, &lattice, &stage, Moments::of_cube).unwrap();
+            let (grid, moments) = Grid::sort(&points, &lattice, &stage, moments).unwrap();
             let (nodes, variations) = nodes(&grid, &moments, true, &stage).unwrap();
             let mut variations = variations.unwrap().into_iter();
 

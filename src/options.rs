@@ -25,11 +25,11 @@ const LEAST_NEIGHBOURS: u32 = 3;
 /// How a normal is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Method {
-    /// Bilinear interpolation between nodes on a grid of cubes: the paper's method.
+    /// Surfaces on a grid of cubes; with cubes of one size bilinear interpolation between their planes, the paper's method.
     #[default]
     Bilinear,
     /// Principal component analysis of the k nearest points, the point itself among them: the paper's ENN. The exact
-    /// reference: eight to fifty times as slow as cubes of one size.
+    /// reference: six to fifty times as slow as cubes of one size.
     Knn,
     /// A quadratic surface through the point's neighbours in the elliptic Gabriel graph, of which the k nearest points
     /// are considered: the paper's EGG. For clean data of uneven density; noise goes straight into its normals.

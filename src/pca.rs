@@ -1,6 +1,5 @@
 //! One neighbourhood: its moments, their shift by whole cubes, and the plane that fits it best.
 
-use crate::grid::Placed;
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 
@@ -51,11 +50,6 @@ impl Moments {
             squares: squares.as_vec3().extend(0.0),
             products: products.as_vec3().extend(0.0),
         }
-    }
-
-    /// The sums of a cube, against its centre.
-    pub fn of_cube(points: &[Placed], centre: Vec3) -> Self {
-        Self::of(points.iter().map(|point| point.local - centre))
     }
 
     /// Adds the sums of the cube that lies `step` cubes away, shifted into this cube's coordinates. The last of the four
@@ -122,6 +116,16 @@ impl Symmetric {
         let longest = if (z > x) & (z > y) { 2 } else { usize::from(y > x) };
         // Isotropic: every direction is an eigenvector, and A - lambda3 has no rows left.
         Some(columns[longest].try_normalize().unwrap_or(DVec3::Z))
+    }
+
+    /// The product with a vector.
+    pub fn times(&self, p: DVec3) -> DVec3 {
+        let (d, o) = (self.diagonal, self.off);
+        DVec3::new(
+            d.x * p.x + o.z * p.y + o.y * p.z,
+            o.z * p.x + d.y * p.y + o.x * p.z,
+            o.y * p.x + o.x * p.y + d.z * p.z,
+        )
     }
 
     /// The sum of the principal 2x2 minors.

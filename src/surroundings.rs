@@ -23,12 +23,10 @@ impl Surroundings {
         let place = grid.bricks.places[brick];
         for Side { step, facing, shift } in &SIDES {
             let Some(number) = grid.bricks.number(place + step) else { continue };
-            let (mask, first) = (grid.masks[number as usize], grid.first_cube[number as usize]);
-            for bit in set_bits(mask & facing) {
-                let before = (mask & ((1 << bit) - 1)).count_ones();
+            for bit in set_bits(grid.masks[number as usize] & facing) {
                 let place = Places::of_cube(bit).wrapping_add_signed(*shift);
                 self.occupied.insert(place);
-                self.cubes[place] = first + before;
+                self.cubes[place] = grid.cube(number as usize, bit);
             }
         }
     }

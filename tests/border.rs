@@ -132,6 +132,19 @@ fn the_report_has_every_field_of_the_contract() {
 }
 
 #[wasm_bindgen_test]
+fn the_report_of_the_automatic_cell_tells_noise_and_scales() {
+    let report = |points: &[f32]| get(&estimate(floats(points), false, &options("{}"), &nobody()).unwrap(), "report");
+    let sphere = report(&single(&sphere()));
+    assert!(number(&sphere, "noise") > 0.0 && number(&sphere, "noise") < 0.1 * number(&sphere, "cellSize"));
+    let scales = Array::from(&get(&sphere, "scales"));
+    assert_eq!(scales.iter().map(|scale| number(&scale, "points")).sum::<f64>(), POINTS as f64);
+    assert!(scales.iter().all(|scale| number(&scale, "cellSize") > 0.0));
+    // Also where there is no surface.
+    let point = report(&[1.0, 2.0, 3.0]);
+    assert_eq!((number(&point, "noise"), Array::from(&get(&point, "scales")).length()), (0.0, 0));
+}
+
+#[wasm_bindgen_test]
 fn curvature_comes_only_where_it_is_asked_for() {
     let points = single(&sphere());
     for method in ["bilinear", "knn", "egg"] {

@@ -25,19 +25,12 @@ impl Around {
         self.brick = brick;
         self.occupied = [0; 8];
         for step in STEPS {
-            let number = if step == IVec3::ZERO {
-                Some(brick as u32)
-            } else {
-                grid.bricks.number(grid.bricks.places[brick] + step)
-            };
-            let Some(number) = number else { continue };
-            let (mask, first) = (grid.masks[number as usize], grid.first_cube[number as usize]);
+            let Some(number) = grid.bricks.number(grid.bricks.places[brick] + step) else { continue };
             let shift = 4 * (step.x + 8 * step.y + 64 * step.z);
-            for bit in set_bits(mask & facing(step)) {
-                let before = (mask & ((1 << bit) - 1)).count_ones();
+            for bit in set_bits(grid.masks[number as usize] & facing(step)) {
                 let place = Self::place(bit).wrapping_add_signed(shift as isize);
                 self.occupied[place / 64] |= 1 << (place % 64);
-                self.cubes[place] = first + before;
+                self.cubes[place] = grid.cube(number as usize, bit);
             }
         }
     }

@@ -60,7 +60,7 @@ impl Chosen {
 const EXCESS: f32 = 6.0;
 
 /// The square angle that a misfit of the size of the neighbourhood is taken for.
-const MISFIT: f32 = 2.0;
+pub(super) const MISFIT: f32 = 2.0;
 
 /// A neighbourhood is flat when it is so many times as wide as thick, squared.
 const FLAT: f32 = 2.0;
@@ -72,7 +72,7 @@ const SAME: f32 = 1e-5;
 #[inline(never)]
 pub(super) fn choose(levels: &[Level], stage: &Stage) -> Result<Vec<Chosen>, Error> {
     let smallest = &levels[levels.len() - 1];
-    let chosen = Filling::new(smallest.cubes(), "the surfaces")?;
+    let chosen = Filling::new(smallest.grid.cubes(), "the surfaces")?;
     smallest.grid.each_cube(stage, &|brick, cube, bit| {
         let place = smallest.place(brick, bit);
         // SAFETY: once for each cube.

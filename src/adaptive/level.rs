@@ -72,7 +72,7 @@ impl Level {
     pub fn coarser(&self, origin: IVec3, stage: &Stage) -> Result<Self, Error> {
         let lattice = self.lattice.in_edges(origin);
         let what = "the samples";
-        let (positions, wholes) = (Filling::new(self.cubes(), what)?, Filling::new(self.cubes(), what)?);
+        let (positions, wholes) = (Filling::new(self.grid.cubes(), what)?, Filling::new(self.grid.cubes(), what)?);
         self.grid.each_cube(&stage.part(0.0..0.3), &|brick, cube, bit| {
             let whole = self.whole(cube);
             let position = lattice.position(self.grid.bricks.places[brick], cube_centre(bit) + whole.place);
@@ -95,8 +95,8 @@ impl Level {
         let grid = &self.grid;
         let is_divided = |cube: usize| rough[cube] && batch.contains(&cube);
         let mut is_near: Vec<AtomicBool> = Vec::new();
-        reserve(&mut is_near, self.cubes(), "the cubes")?;
-        is_near.resize_with(self.cubes(), AtomicBool::default);
+        reserve(&mut is_near, self.grid.cubes(), "the cubes")?;
+        is_near.resize_with(self.grid.cubes(), AtomicBool::default);
         stage.part(0.0..0.1).run(grid.blocks.len(), &|block| {
             let (mut around, mut near) = (Around::new(), Vec::new());
             for (brick, _, bit) in grid.cubes_in(block).filter(|&(_, cube, _)| is_divided(cube)) {
@@ -115,7 +115,7 @@ impl Level {
         let (mut names, mut positions) = (Vec::new(), Vec::new());
         reserve(&mut names, count, "the detail")?;
         reserve(&mut positions, count, "the detail")?;
-        for placed in (0..self.cubes()).filter(|&cube| is_near[cube]).flat_map(|cube| self.points(cube)) {
+        for placed in (0..self.grid.cubes()).filter(|&cube| is_near[cube]).flat_map(|cube| self.points(cube)) {
             let name = self.name(placed);
             names.push(name);
             positions.push(points.positions[name as usize]);
@@ -126,7 +126,7 @@ impl Level {
         let lattice = self.lattice.finer().part(2 * first, 2 * last + 1);
         let mut level = Self::new(&points, lattice, None, &stage.part(0.1..0.5))?;
         level.fit(&stage.part(0.5..0.9))?;
-        let wanted = Filling::new(level.cubes(), "the cubes")?;
+        let wanted = Filling::new(level.grid.cubes(), "the cubes")?;
         level.grid.each_cube(&stage.part(0.9..1.0), &|brick, cube, bit| {
             // In whole numbers: a point must get its normal once.
             let whole = self.number(level.place(brick, bit) >> 1);
@@ -141,12 +141,7 @@ impl Level {
 
     /// Gives up what only the smallest cubes need.
     pub fn release(&mut self) {
-        (self.grid.placed, self.samples, self.names) = (Vec::new(), Samples::default(), None);
-    }
-
-    /// How many cubes there are.
-    pub fn cubes(&self) -> usize {
-        self.sample_end.len()
+        (self.grid.placed, self.samples) = (Vec::new(), Samples::default());
     }
 
     /// Whether the points of a cube are to get their normals here.
@@ -183,16 +178,15 @@ impl Level {
     pub fn number(&self, place: IVec3) -> Option<usize> {
         let (brick, inside): (IVec3, IVec3) = (place >> 2, place & 3);
         let brick = self.grid.bricks.number(brick)? as usize;
-        let mask = self.grid.masks[brick] >> (inside.x + 4 * inside.y + 16 * inside.z);
-        // Those from there on, from the end.
-        (mask & 1 == 1).then(|| (self.grid.first_cube[brick + 1] - mask.count_ones()) as usize)
+        let bit = (inside.x + 4 * inside.y + 16 * inside.z) as u32;
+        (self.grid.masks[brick] >> bit & 1 == 1).then(|| self.grid.cube(brick, bit) as usize)
     }
 
     /// Finds the surface of every cube, through the samples in it and the 26 round it.
     #[inline(never)]
     pub fn fit(&mut self, stage: &Stage) -> Result<(), Error> {
         let grid = &self.grid;
-        let surfaces = Filling::new(self.cubes(), "the surfaces")?;
+        let surfaces = Filling::new(self.grid.cubes(), "the surfaces")?;
         stage.run(grid.blocks.len(), &|block| {
             let (mut around, mut near, mut window) = (Around::new(), Vec::new(), Window::new());
             for (brick, cube, bit) in grid.cubes_in(block) {

@@ -5,7 +5,7 @@ use crate::pca::Symmetric;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3, Vec4};
 
-/// A symmetric matrix: xx, yy, zz and yz, xz, xy.
+/// A symmetric matrix in single precision, as [`Symmetric`] is in double: xx, yy, zz and yz, xz, xy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Matrix {
@@ -352,17 +352,9 @@ fn solve(matrix: &mut [[f64; 6]; 6], mut right: [f64; 6]) -> Option<([f64; 6], [
 #[optimize(size)]
 #[inline(never)]
 fn principal(covariance: &Symmetric, normal: DVec3) -> (Vec3, Vec3, [f64; 3]) {
-    let times = |p: DVec3| {
-        let (d, o) = (covariance.diagonal, covariance.off);
-        DVec3::new(
-            d.x * p.x + o.z * p.y + o.y * p.z,
-            o.z * p.x + d.y * p.y + o.x * p.z,
-            o.y * p.x + o.x * p.y + d.z * p.z,
-        )
-    };
     let u = normal.any_orthonormal_vector();
     let v = normal.cross(u);
-    let (cu, cv) = (times(u), times(v));
+    let (cu, cv) = (covariance.times(u), covariance.times(v));
     let (uu, uv, vv) = (u.dot(cu), u.dot(cv), v.dot(cv));
     let (half, middle) = (0.5 * (uu - vv), 0.5 * (uu + vv));
     let root = (half * half + uv * uv).sqrt();
@@ -370,7 +362,7 @@ fn principal(covariance: &Symmetric, normal: DVec3) -> (Vec3, Vec3, [f64; 3]) {
     let direction = if half >= 0.0 { u * (half + root) + v * uv } else { u * uv + v * (root - half) };
     let first = direction.try_normalize().unwrap_or(u);
     let second = normal.cross(first);
-    let values = [middle + root, (middle - root).max(0.0), normal.dot(times(normal)).max(0.0)];
+    let values = [middle + root, (middle - root).max(0.0), normal.dot(covariance.times(normal)).max(0.0)];
     (first.as_vec3(), second.as_vec3(), values)
 }
 

@@ -2,7 +2,7 @@
 
 use super::SIZES;
 use super::around::Around;
-use super::choose::Chosen;
+use super::choose::{Chosen, MISFIT};
 use super::level::Level;
 use super::samples::transposed;
 use super::surface::{dot_lanes, times_lanes};
@@ -31,9 +31,6 @@ const SMOOTH: f32 = 0.05;
 /// Cubes whose surface rests on fewer points are not divided: the surfaces of the halves would rest on a quarter of them.
 const DIVIDED_POINTS: f32 = 60.0;
 
-/// The square angle that a misfit of the size of the neighbourhood is taken for.
-const MISFIT: f32 = 2.0;
-
 /// The cubes of a level, and the surfaces they rest on.
 pub(super) struct Vote<'a> {
     pub level: &'a Level,
@@ -52,7 +49,7 @@ impl Vote<'_> {
     #[inline(never)]
     pub fn run(&self, stage: &Stage) -> Result<(Vec<bool>, Counts), Error> {
         let level = self.level;
-        let rough = Filling::new(level.cubes(), "the cubes")?;
+        let rough = Filling::new(level.grid.cubes(), "the cubes")?;
         let counts = [const { AtomicU64::new(0) }; SIZES];
         stage.run(level.grid.blocks.len(), &|block| {
             let mut booth = Booth::new(self, &counts);
@@ -129,7 +126,7 @@ impl<'a> Booth<'a> {
     }
 }
 
-/// The median of some values, none of them negative; infinite if there are none.
+/// The median of some values, none of them negative; 0 if there are none.
 pub(super) fn median(values: &[f32]) -> f32 {
     // Bit by bit: the bits of numbers that are not negative are in the order of the numbers.
     let mut bits = 0u32;
@@ -139,7 +136,7 @@ pub(super) fn median(values: &[f32]) -> f32 {
             bits = more;
         }
     }
-    if values.is_empty() { f32::INFINITY } else { f32::from_bits(bits) }
+    if values.is_empty() { 0.0 } else { f32::from_bits(bits) }
 }
 
 /// The value that a quarter of at most 125 values do not exceed; infinite if fewer than four are finite, and only these
@@ -391,7 +388,7 @@ mod tests {
     fn medians_and_quartiles_are_those_of_the_sorted_values() {
         let values: Vec<f32> = (0..101).map(|i| ((i * 37) % 101) as f32 * 1e-9).collect();
         assert_eq!((median(&values), quartile(values.iter().copied())), (50.0 * 1e-9, 25.0 * 1e-9));
-        assert_eq!((median(&[3.5]), median(&[])), (3.5, f32::INFINITY));
+        assert_eq!((median(&[3.5]), median(&[])), (3.5, 0.0));
         for (some, expected) in
             [(&[1.0, 2.0, 3.0][..], f32::INFINITY), (&[4.0, 2.0, 3.0, 1.0], 2.0), (&[2.0; 125], 2.0)]
         {

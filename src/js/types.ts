@@ -15,9 +15,9 @@ export interface Progress {
 
 export interface EstimateOptions {
   /**
-   * Default `'bilinear'`, the paper's method. The others are its baselines, eight to fifty times as slow as cubes of one
-   * size: `'knn'` fits a plane to the k nearest points, `'egg'` a curved surface to the neighbours in the elliptic
-   * Gabriel graph.
+   * Default `'bilinear'`: surfaces on a grid of cubes, with cubes of one size the paper's method. The others are its
+   * baselines, six to fifty times as slow as cubes of one size: `'knn'` fits a plane to the k nearest points, `'egg'` a
+   * curved surface to the neighbours in the elliptic Gabriel graph.
    */
   method?: 'bilinear' | 'knn' | 'egg';
   /**
@@ -55,7 +55,8 @@ export interface EstimateResult {
    * If asked for, the surface variation lambda3 / (lambda1 + lambda2 + lambda3) (Pauly, Gross and Kobbelt 2002), one
    * number a point: 0 where the neighbourhood is flat, up to 1/3 where it has no direction; 0 for unresolved points too.
    * Its square root grows about as the curvature of the surface times the size of the neighbourhood: for `'bilinear'`
-   * the cubes round the point, for `'knn'` and `'egg'` the k nearest points.
+   * the cubes round the point, with `cell: 'auto'` those that were chosen for its cube; for `'knn'` and `'egg'` the k
+   * nearest points.
    */
   curvature?: Float32Array;
   report: Report;
@@ -69,7 +70,7 @@ export interface Report {
   cells: number;
   /** Cubes with a valid node; with `cell: 'auto'`, with a surface. */
   nodes: number;
-  /** Cubes along each axis. */
+  /** Cubes along each axis, at most 2^30; with `cell: 'auto'` at most 2^22. */
   grid: [number, number, number];
   /** Edge of the cubes in the units of the input; with `cell: 'auto'`, of those that it begins with. */
   cellSize: number;
@@ -77,7 +78,7 @@ export interface Report {
   scale: number;
   /**
    * How far the points lie off the surface, in the units of the input: the deviation that half of the cubes of `cellSize`
-   * do not exceed. Only with `cell: 'auto'`.
+   * do not exceed; 0 if there is no surface. Only with `cell: 'auto'`.
    */
   noise?: number;
   /**

@@ -75,6 +75,15 @@ test('--curvature adds a property, and replaces it when there is one', () => {
   assert.notDeepEqual(of('again.ply').values, of('bent.ply').values);
 });
 
+test('the report tells what each kind of cells has to tell', () => {
+  const auto = run(['sphere.ply', '-o', 'told.ply']).stdout;
+  assert.match(auto, /^ *noise +[\d.e-]+$/m);
+  assert.match(auto, /^ *cube edges +.+: [\d.]+ %/m);
+  const fixed = run(['sphere.ply', '-o', 'told.ply', '--cell-scale', '1']).stdout;
+  assert.match(fixed, /^ *nodes used +0: 0 /m);
+  assert.doesNotMatch(fixed, /noise/);
+});
+
 test('--json prints the report as one line, --quiet nothing', () => {
   const { stdout } = run([
     'sphere.ply',

@@ -88,7 +88,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   let sparse: BufferGeometry | undefined;
   /** One of these two is the attribute `color`. */
   let fileColors: BufferAttribute | undefined;
-  let curvatureColors: BufferAttribute | undefined;
+  let hasCurvature = false;
   let shading: Shading = 'shaded';
   let pointSize = 1;
   let margins: Margins = { top: 0, right: 0, bottom: 0, left: 0 };
@@ -155,10 +155,23 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     material.size = pointSize * spacing * Math.min(2, Math.sqrt(1 / drawn));
   }
 
+  /** New values of an attribute, in the buffer that it has on the graphics card. */
+  function setValues(name: string, values: Float32Array | Uint8Array, size: number): void {
+    const before = whole.getAttribute(name);
+    if (before instanceof BufferAttribute) {
+      before.array = values;
+      before.needsUpdate = true;
+    } else {
+      const attribute = new BufferAttribute(values, size, values instanceof Uint8Array);
+      whole.setAttribute(name, attribute);
+      sparse?.setAttribute(name, attribute);
+    }
+  }
+
   function chooseShading(): void {
     const lit = whole.hasAttribute('normal');
-    const bent = shading === 'curvature' && curvatureColors;
-    const colors = bent || fileColors;
+    const bent = shading === 'curvature' && hasCurvature;
+    const colors = bent ? whole.getAttribute('curvature') : fileColors;
     for (const geometry of [whole, sparse]) {
       if (colors) geometry?.setAttribute('color', colors);
       else geometry?.deleteAttribute('color');
@@ -252,7 +265,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       whole = new BufferGeometry();
       whole.setAttribute('position', new BufferAttribute(next.positions, 3));
       fileColors = next.colors && new BufferAttribute(next.colors, 4, true);
-      curvatureColors = undefined;
+      hasCurvature = false;
       whole.boundingSphere = new Sphere(new Vector3(...bounds.centre), bounds.reach);
       sparse = undefined;
       const all = next.positions.length / 3;
@@ -269,18 +282,10 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       viewer.setUp(up);
       fit();
     },
-    setNormals(normals, nextCurvatureColors) {
-      curvatureColors = nextCurvatureColors && new BufferAttribute(nextCurvatureColors, 4, true);
-      const before = whole.getAttribute('normal');
-      if (before instanceof BufferAttribute) {
-        // The same buffer on the graphics card takes the new values.
-        before.array = normals;
-        before.needsUpdate = true;
-      } else {
-        const attribute = new BufferAttribute(normals, 3);
-        whole.setAttribute('normal', attribute);
-        sparse?.setAttribute('normal', attribute);
-      }
+    setNormals(normals, curvatureColors) {
+      hasCurvature = curvatureColors !== undefined;
+      if (curvatureColors) setValues('curvature', curvatureColors, 4);
+      setValues('normal', normals, 3);
       chooseShading();
       request();
     },
