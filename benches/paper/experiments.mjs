@@ -19,7 +19,11 @@ export const OURS = Object.keys(VARIANTS).filter((name) => !VARIANTS[name].metho
 /** Those whose points are told apart by the number of their nodes. */
 export const CLASSED = ['0.4 L', '1.0 L'];
 
-/** How much is measured. `rounds`: runs of each variant; the baselines take so much longer that every other round does. */
+/**
+ * How much is measured. `rounds`: runs of each variant; the baselines take so much longer that every other round does. A run
+ * is as many estimates as it takes to fill `least` milliseconds: the processor's speed changes within tens of these, and
+ * what is short must not meet other conditions than what is long.
+ */
 export const FULL = {
   spheres: [187_500, 375_000, 750_000, 1_500_000, 3_000_000],
   freeForm: 712_000,
@@ -27,6 +31,7 @@ export const FULL = {
   factors: [0.3, 0.4, 0.5, 0.8, 1, 1.2, 1.5, 2, 2.4, 3, 4, 5, 6],
   leastScan: 100_000,
   rounds: 7,
+  least: 150,
 };
 /** For tests: seconds. */
 export const SMALL = {
@@ -36,6 +41,7 @@ export const SMALL = {
   factors: [0.4, 0.8, 1, 1.2, 1.5, 2, 2.4, 3, 6],
   leastScan: 1_000,
   rounds: 1,
+  least: 0,
 };
 
 /** All experiments; `tell` hears what is being measured. */
@@ -43,16 +49,17 @@ export async function measureAll(estimator, { plan, scans, tell }) {
   const patch = freeForm(plan.freeForm);
   const surface = { name: 'free-form surface', positions: patch.positions, truth: patch.normals };
   const clouds = [...plan.spheres.map((points) => ball(`${points / 1e6} M`, points, CLASSED)), surface, ...scans];
-  const { rounds } = plan;
+  const { rounds, least } = plan;
   // The engine compiles what is hot once more, better: not during what counts.
-  await compare(estimator, [ball('warm-up', 50_000)], { variants: VARIANTS, rounds: 2, tell: () => {} });
-  const compared = await compare(estimator, clouds, { variants: VARIANTS, rounds, tell });
+  await compare(estimator, [ball('warm-up', 50_000)], { variants: VARIANTS, rounds: 2, least: 0, tell: () => {} });
+  const compared = await compare(estimator, clouds, { variants: VARIANTS, rounds, least, tell });
 
   const factors = Object.fromEntries(plan.factors.map((scale) => [scale, { cell: { scale } }]));
   const swept = [ball('sphere', plan.sweep), surface, ...scans.slice(-1)];
-  const sweep = await compare(estimator, swept, { variants: factors, rounds, tell });
+  const sweep = await compare(estimator, swept, { variants: factors, rounds, least, tell });
   return {
     rounds,
+    least,
     spheres: compared.slice(0, plan.spheres.length),
     freeForm: compared[plan.spheres.length],
     scans: compared.slice(plan.spheres.length + 1),
@@ -73,14 +80,14 @@ function ball(name, points, classed = []) {
  * Runs all variants on all clouds in turn, round by round, so that whatever else the machine does hits all of them. A
  * cloud with `truth`, the true normals, gets errors too; `classed` are the variants whose points are told apart by nodes.
  */
-async function compare(estimator, clouds, { variants, rounds, tell }) {
+async function compare(estimator, clouds, { variants, rounds, least, tell }) {
   const rows = clouds.map(({ name, about, positions }) => ({ name, about, points: positions.length / 3, methods: {} }));
   for (let round = 0; round < rounds; round++) {
     for (const [i, { positions, truth, classed = [] }] of clouds.entries()) {
       tell(`round ${round + 1} of ${rounds}: ${rows[i].name}`);
       for (const [name, options] of Object.entries(variants)) {
         if (options.method && round % 2 === 1) continue;
-        const { normals, report } = await estimator.estimateNormals(positions, options);
+        const { normals, report } = await run(estimator, positions, options, least);
         const errors = () => truth && judge(positions, truth, normals, report, classed.includes(name));
         rows[i].methods[name] ??= { reports: [], errors: errors() };
         rows[i].methods[name].reports.push(report);
@@ -91,6 +98,20 @@ async function compare(estimator, clouds, { variants, rounds, tell }) {
     for (const [name, { reports, errors }] of Object.entries(methods)) methods[name] = { ...times(reports), ...errors };
   }
   return rows;
+}
+
+/** One estimate after the other until `least` milliseconds have passed: the last, with the means of their times. */
+async function run(estimator, positions, options, least) {
+  const all = [];
+  const start = performance.now();
+  let result;
+  do {
+    result = await estimator.estimateNormals(positions, options);
+    all.push(result.report.milliseconds);
+  } while (performance.now() - start < least);
+  const mean = (phase) => all.reduce((sum, milliseconds) => sum + milliseconds[phase], 0) / all.length;
+  const milliseconds = Object.fromEntries(Object.keys(all[0]).map((phase) => [phase, mean(phase)]));
+  return { normals: result.normals, report: { ...result.report, milliseconds } };
 }
 
 function judge(positions, truth, normals, report, isClassed) {
