@@ -15,7 +15,7 @@ mod vote;
 use crate::error::Error;
 use crate::lattice::{self, Lattice};
 use crate::normals::{Found, Normals};
-use crate::points::Points;
+use crate::points::{Points, reserve};
 use crate::progress::{Progress, Stage};
 use choose::{Chosen, choose};
 use glam::{IVec3, Vec3};
@@ -87,7 +87,9 @@ pub(crate) fn normals(
 
     let mut run = Run { points, normals: &normals, cubes: 0, surfaces: 0, chosen_by: [0; SIZES] };
     let (rough, chosen) = run.settle(&levels, 0, &progress.stage("vote", 0.5..0.6))?;
-    let noises: Vec<f32> = chosen.iter().filter(|chosen| chosen.is_some()).map(|chosen| chosen.noise).collect();
+    let mut noises = Vec::new();
+    reserve(&mut noises, chosen.len(), "the surfaces")?;
+    noises.extend(chosen.iter().filter(|chosen| chosen.is_some()).map(|chosen| chosen.noise));
     let noise = f64::from(median(&noises)).sqrt();
     drop((chosen, noises));
     lap("vote");
