@@ -1,7 +1,7 @@
 //! One neighbourhood: its moments, their shift by whole cubes, and the plane that fits it best.
 
 use bytemuck::Zeroable;
-use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
+use glam::{DMat3, DVec3, Vec3, Vec4, Vec4Swizzles};
 
 /// A neighbourhood whose second eigenvalue is below this (in square edges, and against the first) lies on one line
 /// or in one point: 1e-6 is three times the rounding of single-precision moments, a thousandth of an edge in length.
@@ -118,14 +118,10 @@ impl Symmetric {
         Some(columns[longest].try_normalize().unwrap_or(DVec3::Z))
     }
 
-    /// The product with a vector.
-    pub fn times(&self, p: DVec3) -> DVec3 {
+    /// All nine entries.
+    pub fn matrix(&self) -> DMat3 {
         let (d, o) = (self.diagonal, self.off);
-        DVec3::new(
-            d.x * p.x + o.z * p.y + o.y * p.z,
-            o.z * p.x + d.y * p.y + o.x * p.z,
-            o.y * p.x + o.x * p.y + d.z * p.z,
-        )
+        DMat3::from_cols(DVec3::new(d.x, o.z, o.y), DVec3::new(o.z, d.y, o.x), DVec3::new(o.y, o.x, d.z))
     }
 
     /// The sum of the principal 2x2 minors.

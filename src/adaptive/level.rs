@@ -160,6 +160,7 @@ impl Level {
     }
 
     /// The sample that stands for a cube.
+    #[inline(always)]
     fn whole(&self, cube: usize) -> Sample {
         Sample::of(range(&self.sample_end, cube).map(|sample| self.samples.get(sample)))
     }

@@ -8,6 +8,7 @@
 mod around;
 mod choose;
 mod level;
+mod matrix;
 mod samples;
 mod surface;
 mod vote;

@@ -1,9 +1,9 @@
 //! What surfaces are fitted to: points, or the centroids of several with their covariance.
 
-use super::surface::Matrix;
+use super::matrix::{Matrix, transposed};
 use crate::error::Error;
 use crate::parallel::Filling;
-use glam::{DVec3, Mat4, Vec3, Vec4};
+use glam::{DVec3, Vec3, Vec4};
 use std::ops::Range;
 
 /// One sample.
@@ -220,13 +220,6 @@ impl Window {
         }
         totals
     }
-}
-
-/// Rows for columns.
-#[inline(always)]
-pub(super) fn transposed([a, b, c, d]: [Vec4; 4]) -> [Vec4; 4] {
-    let Mat4 { x_axis, y_axis, z_axis, w_axis } = Mat4::from_cols(a, b, c, d).transpose();
-    [x_axis, y_axis, z_axis, w_axis]
 }
 
 #[cfg(test)]

@@ -1,65 +1,10 @@
 //! A quadratic surface through the samples of a neighbourhood, and how much its normals are to be trusted.
 
+use super::matrix::{Matrix, times_lanes};
 use super::samples::Window;
 use crate::pca::Symmetric;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3, Vec4};
-
-/// A symmetric matrix in single precision, as [`Symmetric`] is in double: xx, yy, zz and yz, xz, xy.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct Matrix {
-    pub diagonal: Vec3,
-    pub off: Vec3,
-}
-
-impl Matrix {
-    /// In four lanes.
-    #[inline(always)]
-    pub fn splat(&self) -> [[Vec4; 3]; 2] {
-        [self.diagonal, self.off].map(|vector| vector.to_array().map(Vec4::splat))
-    }
-
-    /// The product with a vector.
-    #[inline(always)]
-    pub fn times(&self, p: Vec3) -> Vec3 {
-        let (d, o) = (self.diagonal, self.off);
-        Vec3::new(
-            d.x * p.x + o.z * p.y + o.y * p.z,
-            o.z * p.x + d.y * p.y + o.x * p.z,
-            o.y * p.x + o.x * p.y + d.z * p.z,
-        )
-    }
-
-    /// `a b^T + b a^T`, halved.
-    #[inline(always)]
-    pub fn product(a: Vec3, b: Vec3) -> Self {
-        let off = Vec3::new(a.y * b.z + a.z * b.y, a.x * b.z + a.z * b.x, a.x * b.y + a.y * b.x);
-        Self { diagonal: a * b, off: 0.5 * off }
-    }
-
-    #[inline(always)]
-    pub fn scaled(&self, factor: f32) -> Self {
-        Self { diagonal: self.diagonal * factor, off: self.off * factor }
-    }
-
-    #[inline(always)]
-    pub fn plus(&self, other: Self) -> Self {
-        Self { diagonal: self.diagonal + other.diagonal, off: self.off + other.off }
-    }
-}
-
-/// The product of matrices, their diagonals and what is off them, with vectors, lane by lane.
-#[inline(always)]
-pub(super) fn times_lanes([d, o]: [[Vec4; 3]; 2], [x, y, z]: [Vec4; 3]) -> [Vec4; 3] {
-    [d[0] * x + o[2] * y + o[1] * z, o[2] * x + d[1] * y + o[0] * z, o[1] * x + o[0] * y + d[2] * z]
-}
-
-/// The product of vectors, lane by lane.
-#[inline(always)]
-pub(super) fn dot_lanes(a: [Vec4; 3], b: [Vec4; 3]) -> Vec4 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
 
 /// The zeros of `height + slope . d + d . bend d / 2`, where `d` is what lies between `centre` and a point: near them its
 /// value is the distance from the surface, and its gradient the normal.
@@ -352,9 +297,10 @@ fn solve(matrix: &mut [[f64; 6]; 6], mut right: [f64; 6]) -> Option<([f64; 6], [
 #[optimize(size)]
 #[inline(never)]
 fn principal(covariance: &Symmetric, normal: DVec3) -> (Vec3, Vec3, [f64; 3]) {
+    let matrix = covariance.matrix();
     let u = normal.any_orthonormal_vector();
     let v = normal.cross(u);
-    let (cu, cv) = (covariance.times(u), covariance.times(v));
+    let (cu, cv) = (matrix * u, matrix * v);
     let (uu, uv, vv) = (u.dot(cu), u.dot(cv), v.dot(cv));
     let (half, middle) = (0.5 * (uu - vv), 0.5 * (uu + vv));
     let root = (half * half + uv * uv).sqrt();
@@ -362,7 +308,7 @@ fn principal(covariance: &Symmetric, normal: DVec3) -> (Vec3, Vec3, [f64; 3]) {
     let direction = if half >= 0.0 { u * (half + root) + v * uv } else { u * uv + v * (root - half) };
     let first = direction.try_normalize().unwrap_or(u);
     let second = normal.cross(first);
-    let values = [middle + root, (middle - root).max(0.0), normal.dot(covariance.times(normal)).max(0.0)];
+    let values = [middle + root, (middle - root).max(0.0), normal.dot(matrix * normal).max(0.0)];
     (first.as_vec3(), second.as_vec3(), values)
 }
 

@@ -4,8 +4,7 @@ use super::SIZES;
 use super::around::Around;
 use super::choose::{Chosen, MISFIT};
 use super::level::Level;
-use super::samples::transposed;
-use super::surface::{dot_lanes, times_lanes};
+use super::matrix::{dot_lanes, times_lanes, transposed};
 use crate::error::Error;
 use crate::grid::Placed;
 use crate::lattice::cube_centre;
@@ -52,20 +51,20 @@ impl Vote<'_> {
         let rough = Filling::new(level.grid.cubes(), "the cubes")?;
         let counts = [const { AtomicU64::new(0) }; SIZES];
         stage.run(level.grid.blocks.len(), &|block| {
-            let mut booth = Booth::new(self, &counts);
+            let mut task = Task::new(self, &counts);
             for (brick, cube, bit) in level.grid.cubes_in(block) {
                 // SAFETY: once for each cube.
-                unsafe { rough.write(cube, level.is_wanted(cube) && !booth.settle(brick, cube, bit)) };
+                unsafe { rough.write(cube, level.is_wanted(cube) && !task.settle(brick, cube, bit)) };
             }
-            self.normals.add_resolved(booth.resolved);
+            self.normals.add_resolved(task.resolved);
         })?;
         // SAFETY: these were all cubes.
         Ok((unsafe { rough.complete() }, counts.map(AtomicU64::into_inner)))
     }
 }
 
-/// Where one cube after the other is voted on.
-struct Booth<'a> {
+/// One cube after the other.
+struct Task<'a> {
     vote: &'a Vote<'a>,
     counts: &'a [AtomicU64; SIZES],
     around: Around,
@@ -74,7 +73,7 @@ struct Booth<'a> {
     resolved: u64,
 }
 
-impl<'a> Booth<'a> {
+impl<'a> Task<'a> {
     fn new(vote: &'a Vote<'a>, counts: &'a [AtomicU64; SIZES]) -> Self {
         Self { vote, counts, around: Around::new(), near: Vec::new(), ballot: Ballot::default(), resolved: 0 }
     }
@@ -161,7 +160,7 @@ fn quartile(values: impl Iterator<Item = f32> + Clone) -> f32 {
     least[rank]
 }
 
-/// `exp(-x)`, nearly: the same bits everywhere. Zero from some 4000.
+/// `exp(-x)`, nearly: the same bits everywhere. Zero from some 10,000.
 #[inline(always)]
 fn fade(x: Vec4) -> Vec4 {
     let mut power = Vec4::ONE / (1.0 + x * (1.0 / 16.0));
