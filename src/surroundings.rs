@@ -131,7 +131,7 @@ const fn near_bit(step: IVec3) -> u32 {
 }
 
 /// The 27 steps from a cube to itself and its neighbours, x fastest.
-pub(crate) const STEPS: [IVec3; 27] = {
+const STEPS: [IVec3; 27] = {
     let mut steps = [IVec3::ZERO; 27];
     let mut i = 0;
     while i < 27 {
@@ -143,26 +143,39 @@ pub(crate) const STEPS: [IVec3; 27] = {
 };
 
 /// A brick next to another, or that itself.
-struct Side {
+pub(crate) struct Side {
     /// How many bricks away.
-    step: IVec3,
-    /// Its cubes that touch the other brick.
-    facing: u64,
+    pub step: IVec3,
+    /// Its cubes that are near the other brick.
+    pub facing: u64,
     /// From the place of a cube of the other brick to that of the same cube of this one.
-    shift: isize,
+    pub shift: isize,
 }
 
-const SIDES: [Side; 27] = {
-    const X: [u64; 3] = [0x8888_8888_8888_8888, u64::MAX, 0x1111_1111_1111_1111];
-    const Y: [u64; 3] = [0xF000_F000_F000_F000, u64::MAX, 0x000F_000F_000F_000F];
-    const Z: [u64; 3] = [0xFFFF_0000_0000_0000, u64::MAX, 0x0000_0000_0000_FFFF];
+const SIDES: [Side; 27] = sides(1);
+
+/// A brick and those round it, with their cubes at most `depth` away from it; places are numbered along x, y, z in a cube
+/// of `4 + 2 depth` of them.
+pub(crate) const fn sides(depth: i32) -> [Side; 27] {
+    /// The cubes that are, along an axis, in the last `depth` layers for a step of -1, in the first for 1, in any for 0.
+    const fn is_facing(place: i32, step: i32, depth: i32) -> bool {
+        step == 0 || (step < 0 && place >= 4 - depth) || (step > 0 && place < depth)
+    }
+    let width = 4 + 2 * depth;
     let mut sides = [const { Side { step: IVec3::ZERO, facing: 0, shift: 0 } }; 27];
     let mut i = 0;
     while i < 27 {
         let step = STEPS[i];
-        let facing = X[(step.x + 1) as usize] & Y[(step.y + 1) as usize] & Z[(step.z + 1) as usize];
-        sides[i] = Side { step, facing, shift: 4 * (step.x + 6 * step.y + 36 * step.z) as isize };
+        let (mut facing, mut bit) = (0, 0);
+        while bit < 64 {
+            let is_facing = is_facing(bit & 3, step.x, depth)
+                && is_facing(bit >> 2 & 3, step.y, depth)
+                && is_facing(bit >> 4, step.z, depth);
+            facing |= (is_facing as u64) << bit;
+            bit += 1;
+        }
+        sides[i] = Side { step, facing, shift: 4 * (step.x + width * (step.y + width * step.z)) as isize };
         i += 1;
     }
     sides
-};
+}

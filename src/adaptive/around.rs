@@ -2,8 +2,10 @@
 
 use crate::bricks::set_bits;
 use crate::grid::Grid;
-use crate::surroundings::STEPS;
-use glam::{IVec3, UVec3, Vec3};
+use crate::surroundings::{Side, sides};
+use glam::{UVec3, Vec3};
+
+const SIDES: [Side; 27] = sides(2);
 
 /// 8x8x8 places: `x + 8 y + 64 z`, the brick's first cube at (2, 2, 2).
 pub(super) struct Around {
@@ -24,11 +26,10 @@ impl Around {
     fn look(&mut self, grid: &Grid, brick: usize) {
         self.brick = brick;
         self.occupied = [0; 8];
-        for step in STEPS {
+        for Side { step, facing, shift } in &SIDES {
             let Some(number) = grid.bricks.number(grid.bricks.places[brick] + step) else { continue };
-            let shift = 4 * (step.x + 8 * step.y + 64 * step.z);
-            for bit in set_bits(grid.masks[number as usize] & facing(step)) {
-                let place = Self::place(bit).wrapping_add_signed(shift as isize);
+            for bit in set_bits(grid.masks[number as usize] & facing) {
+                let place = Self::place(bit).wrapping_add_signed(*shift);
                 self.occupied[place / 64] |= 1 << (place % 64);
                 self.cubes[place] = grid.cube(number as usize, bit);
             }
@@ -59,22 +60,13 @@ impl Around {
     }
 }
 
-/// The cubes of the brick `step` away that are at most two away from this brick.
-fn facing(step: IVec3) -> u64 {
-    const X: [u64; 3] = [0xCCCC_CCCC_CCCC_CCCC, u64::MAX, 0x3333_3333_3333_3333];
-    const Y: [u64; 3] = [0xFF00_FF00_FF00_FF00, u64::MAX, 0x00FF_00FF_00FF_00FF];
-    const Z: [u64; 3] = [0xFFFF_FFFF_0000_0000, u64::MAX, 0x0000_0000_FFFF_FFFF];
-    let [x, y, z] = (step + 1).to_array().map(|i| i as usize);
-    X[x] & Y[y] & Z[z]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::lattice::{CUBES, Lattice, cube_centre};
     use crate::points::{Bounds, Points};
     use crate::progress::Progress;
-    use glam::DVec3;
+    use glam::{DVec3, IVec3};
 
     #[test]
     fn near_cubes_are_those_of_a_search() {
