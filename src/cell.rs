@@ -2,7 +2,6 @@
 
 use crate::error::Error;
 use crate::number;
-use crate::options::Cell;
 use crate::parallel::{self, Gathering};
 use crate::points::{Bounds, Bulk, Points};
 use crate::power::{exp2, log2};
@@ -43,20 +42,14 @@ pub(crate) fn paper_edge(extent: DVec3, count: usize) -> f64 {
     if edge > 0.0 && edge.is_finite() { edge } else { 1.0 }
 }
 
-/// The edge that `cell` asks for, in units of the positions.
-pub(crate) fn edge(cell: Cell, points: &Points, bounds: &Bounds) -> Result<f64, Error> {
-    match cell {
-        Cell::Auto => populated_edge(points, bounds, &Bulk::of_points(points)),
-        Cell::Scale(scale) => Ok(scale * paper_edge(bounds.extent(), bounds.finite)),
-        Cell::Size(size) => {
-            let edge = size / points.unit;
-            if edge.is_normal() && edge.recip().is_normal() {
-                return Ok(edge);
-            }
-            let size = number::text(size);
-            Err(Error::input(format_args!("cell.size is {size}, out of all proportion to the cloud; wanted another")))
-        }
+/// The edge of `size`, in units of the positions; one of these is `unit` of the input.
+pub(crate) fn edge_of_size(size: f64, unit: f64) -> Result<f64, Error> {
+    let edge = size / unit;
+    if edge.is_normal() && edge.recip().is_normal() {
+        return Ok(edge);
     }
+    let size = number::text(size);
+    Err(Error::input(format_args!("cell.size is {size}, out of all proportion to the cloud; wanted another")))
 }
 
 /// The edge that puts [`POINTS_PER_CELL`] points into an occupied cube.

@@ -80,9 +80,7 @@ pub struct Scale {
 /// [`Error::Cancelled`] when `progress` asked for it.
 #[optimize(size)]
 pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Result<Estimate, Error> {
-    if cfg!(feature = "full") {
-        options.validate()?;
-    }
+    options.validate()?;
     // Places and counts are 32-bit numbers.
     if points.len() >= u32::MAX as usize {
         return Err(Error::input(format_args!("the cloud has {} points; at most {} fit", points.len(), u32::MAX - 1)));
@@ -93,12 +91,17 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     let bounds = Bounds::of(points);
     laps.end("bounds");
 
+    if !cfg!(feature = "full") {
+        return adaptive(points, options, &bounds, laps);
+    }
     match (options.method, options.cell) {
         (Method::Bilinear, Cell::Auto) => adaptive(points, options, &bounds, laps),
-        _ if !cfg!(feature = "full") => {
-            Err(Error::Unsupported("this module has only method 'bilinear' with cell 'auto'".into()))
+        (Method::Bilinear, Cell::Scale(scale)) => {
+            bilinear(points, options, scale * cell::paper_edge(bounds.extent(), bounds.finite), &bounds, laps)
         }
-        (Method::Bilinear, cell) => bilinear(points, options, cell::edge(cell, points, &bounds)?, &bounds, laps),
+        (Method::Bilinear, Cell::Size(size)) => {
+            bilinear(points, options, cell::edge_of_size(size, points.unit)?, &bounds, laps)
+        }
         (Method::Knn, _) => {
             baseline(points, options, Baseline::Knn { k: options.k.unwrap_or(16) as usize }, &bounds, laps)
         }

@@ -70,8 +70,13 @@ pub enum Orient {
 }
 
 impl Options {
-    /// Refuses values out of range, and what this version does not offer.
+    /// Refuses values out of range, and what this version, or without the feature `full` this build, does not offer.
     pub fn validate(&self) -> Result<(), Error> {
+        if !cfg!(feature = "full") {
+            let offered = Self { curvature: self.curvature, ..Self::default() };
+            let refusal = || Error::Unsupported("this build has the default options only, and curvature".into());
+            return if *self == offered { Ok(()) } else { Err(refusal()) };
+        }
         match self.cell {
             Cell::Auto => {}
             Cell::Scale(scale) if (0.1..=100.0).contains(&scale) => {}
