@@ -43,7 +43,7 @@ pub enum Method {
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub enum Cell {
     /// Every place takes the size that its noise and its detail allow: nothing to choose (docs/adaptive.md). Stray points
-    /// change nothing.
+    /// change next to nothing.
     #[default]
     Auto,
     /// Multiples of the paper's L (Eq. 1), 0.1 to 100; the paper advises 1.0 to 1.5. L is defined by the bounding box:

@@ -1,7 +1,7 @@
 //! Seeded clouds with known normals.
 #![allow(dead_code)] // Each test file uses its own part.
 
-use bilinormal::{Cell, Estimate, Options, Points, Progress, estimate};
+use bilinormal::{Cell, Estimate, Method, Options, Points, Progress, estimate};
 use std::f64::consts::TAU;
 
 /// Points and their true unit normals.
@@ -147,6 +147,12 @@ pub fn unit(a: [f64; 3]) -> [f64; 3] {
 /// Runs the estimator without an audience.
 pub fn run(points: &[f32], cell: Cell) -> Estimate {
     run_with(&Points::from_f32(points).unwrap(), &Options { cell, ..Options::default() })
+}
+
+/// The planes of the k nearest points.
+pub fn run_knn(points: &[f32], k: u32) -> Estimate {
+    let options = Options { method: Method::Knn, k: Some(k), ..Options::default() };
+    run_with(&Points::from_f32(points).unwrap(), &options)
 }
 
 pub fn run_with(points: &Points, options: &Options) -> Estimate {

@@ -109,11 +109,12 @@ function showJob({ job }: State): void {
 /** What the method tells of itself. */
 function factsOf(report: Report, used: State['used']): HTMLElement[] {
   if (used && used.method !== 'bilinear') return [fact(METHODS[used.method].name, `k = ${count(used.k)}`)];
-  if (report.noise !== undefined && report.scales?.length) {
-    const edges = [report.scales[0]!, report.scales.at(-1)!].map(({ cellSize }) => measure(cellSize));
+  if (report.noise !== undefined) {
+    // Without a surface no size was chosen.
+    const edges = (report.scales ?? []).map(({ cellSize }) => measure(cellSize));
     return [
       fact(count(report.cells), 'cubes'),
-      fact(edges[0] === edges[1] ? edges[0]! : edges.join(' to '), 'edge'),
+      ...(edges.length ? [fact([...new Set([edges[0]!, edges.at(-1)!])].join(' to '), 'edge')] : []),
       fact(measure(report.noise), 'noise'),
     ];
   }
