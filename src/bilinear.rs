@@ -2,7 +2,7 @@
 
 use crate::bricks::set_bits;
 use crate::error::Error;
-use crate::grid::{Grid, Placed};
+use crate::grid::{Grid, Placed, octants};
 use crate::lattice::cube_centre;
 use crate::nodes::Node;
 use crate::normals::{Found, Normals};
@@ -212,14 +212,7 @@ impl<'a> Cube<'a> {
     /// one after the other, share its nodes; four at a time are computed at once.
     #[inline(always)]
     fn interpolate(&self, points: &[Placed], normals: &Normals, tally: &mut Tally) {
-        let centre = self.centre.extend(0.0);
-        let octant_of = |placed: &Placed| placed.lanes().cmpge(centre).bitmask() & 7;
-        let mut rest = points;
-        while let Some(first) = rest.first() {
-            let number = octant_of(first);
-            let length = 1 + rest[1..].iter().take_while(|placed| octant_of(placed) == number).count();
-            let (points, others) = rest.split_at(length);
-            rest = others;
+        for (number, points) in octants(points, self.centre) {
             let Some(octant) = self.octant(number) else {
                 tally.used[0] += points.len() as u64;
                 for placed in points {

@@ -160,6 +160,22 @@ impl Grid {
     }
 }
 
+/// The points of a cube octant by octant, each after its number: bits 0, 1 and 2 tell whether it is not below the cube's
+/// centre along x, y and z.
+#[inline(always)]
+pub(crate) fn octants(points: &[Placed], centre: Vec3) -> impl Iterator<Item = (u32, &[Placed])> {
+    let centre = centre.extend(0.0);
+    let octant_of = move |placed: &Placed| placed.lanes().cmpge(centre).bitmask() & 7;
+    let mut rest = points;
+    std::iter::from_fn(move || {
+        let octant = octant_of(rest.first()?);
+        let length = 1 + rest[1..].iter().take_while(|placed| octant_of(placed) == octant).count();
+        let (points, others) = rest.split_at(length);
+        rest = others;
+        Some((octant, points))
+    })
+}
+
 /// Sorts the points by brick: a counting sort, stable, so its result does not depend on how the input is cut.
 #[optimize(size)]
 fn sort_by_brick(

@@ -4,7 +4,7 @@ use super::around::Around;
 use super::samples::{Sample, Samples, Window, Writing};
 use super::surface::Surface;
 use crate::error::Error;
-use crate::grid::{Grid, Placed};
+use crate::grid::{Grid, Placed, octants};
 use crate::lattice::{BRICK, Lattice, cube_centre};
 use crate::parallel::Filling;
 use crate::points::{Points, reserve};
@@ -50,7 +50,7 @@ impl Level {
         grid.each_cube(&stage.part(0.9..1.0), &|_, cube, bit| {
             let start = range(&sample_end, cube).start;
             let centre = cube_centre(bit);
-            for (i, octant) in octants(&grid.placed[range(&grid.cube_end, cube)], centre).enumerate() {
+            for (i, (_, octant)) in octants(&grid.placed[range(&grid.cube_end, cube)], centre).enumerate() {
                 let sample = |p: &Placed| match wholes {
                     None => Sample::point(p.local - centre),
                     Some(wholes) => wholes[p.point as usize].halved(p.local - centre),
@@ -211,11 +211,4 @@ impl Level {
 fn range(ends: &[u32], cube: usize) -> Range<usize> {
     let start = if cube == 0 { 0 } else { ends[cube - 1] };
     start as usize..ends[cube] as usize
-}
-
-/// The points of a cube, octant by octant.
-fn octants(placed: &[Placed], centre: Vec3) -> impl Iterator<Item = &[Placed]> {
-    let centre = centre.extend(0.0);
-    let octant = move |p: &Placed| p.lanes().cmpge(centre).bitmask() & 7;
-    placed.chunk_by(move |a, b| octant(a) == octant(b))
 }
