@@ -90,7 +90,7 @@ async function compare(estimator, clouds, { variants, rounds, least, tell }) {
         const { normals, report } = await run(estimator, positions, options, least);
         const errors = () => truth && judge(positions, truth, normals, report, classed.includes(name));
         rows[i].methods[name] ??= { reports: [], errors: errors() };
-        rows[i].methods[name].reports.push(report);
+        rows[i].methods[name].reports[round] = report;
       }
     }
   }
@@ -100,7 +100,7 @@ async function compare(estimator, clouds, { variants, rounds, least, tell }) {
   return rows;
 }
 
-/** One estimate after the other until `least` milliseconds have passed: the last, with the means of their times. */
+/** One estimate after the other until `least` milliseconds have passed: the last, with the medians of their times. */
 async function run(estimator, positions, options, least) {
   const all = [];
   const start = performance.now();
@@ -109,8 +109,8 @@ async function run(estimator, positions, options, least) {
     result = await estimator.estimateNormals(positions, options);
     all.push(result.report.milliseconds);
   } while (performance.now() - start < least);
-  const mean = (phase) => all.reduce((sum, milliseconds) => sum + milliseconds[phase], 0) / all.length;
-  const milliseconds = Object.fromEntries(Object.keys(all[0]).map((phase) => [phase, mean(phase)]));
+  const middle = (phase) => median(all.map((milliseconds) => milliseconds[phase]));
+  const milliseconds = Object.fromEntries(Object.keys(all[0]).map((phase) => [phase, middle(phase)]));
   return { normals: result.normals, report: { ...result.report, milliseconds } };
 }
 
@@ -133,18 +133,22 @@ function byClass(classOf, errors, { points, nodesUsed }) {
 }
 
 /**
- * Medians of some runs, in milliseconds: `module`, the sum of the phases inside the wasm module, of which there is also
- * the `fastest`; `total`, what the caller waits for, with copies in and out. And what the report tells besides.
+ * Medians of the runs of some rounds, in milliseconds: `module`, the sum of the phases inside the wasm module, of which
+ * there is also the `fastest`; `total`, what the caller waits for, with copies in and out. Both round by round too, with
+ * gaps where there was no run: `rounds`. And what the report tells besides.
  */
-function times(reports) {
+function times(byRound) {
+  const reports = byRound.filter(Boolean);
   const { milliseconds, ...facts } = reports[0];
   const phases = Object.keys(milliseconds).filter((phase) => phase !== 'total');
-  const sums = reports.map((report) => phases.reduce((sum, phase) => sum + report.milliseconds[phase], 0));
+  const sum = (report) => phases.reduce((sum, phase) => sum + report.milliseconds[phase], 0);
+  const sums = reports.map(sum);
   return {
     ...facts,
     module: median(sums),
     fastest: Math.min(...sums),
     total: median(reports.map((report) => report.milliseconds.total)),
+    rounds: { module: byRound.map(sum), total: byRound.map((report) => report.milliseconds.total) },
     phases: Object.fromEntries(
       phases.map((phase) => [phase, median(reports.map((report) => report.milliseconds[phase]))]),
     ),

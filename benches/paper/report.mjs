@@ -76,7 +76,7 @@ export function report(rows, { machine, minutes, pictures, skipped, hasFolder })
   return `${paragraphs(
     '# The paper, reproduced',
     '“An Investigation of the High Efficiency Estimation Approach of the Large-Scale Scattered Point Cloud Normal Vector”, its experiments with this package. Written by `npm run paper`, text and all; not to be edited.',
-    `${model}, ${cores} cores, Node ${node}, ${date}; took ${minutes.toFixed(1)} minutes. All times are of the single-threaded WebAssembly build in Node, on one core, in milliseconds: the phases inside the module, for all methods alike. The clouds lie in memory in random order, scans in that of their files. Each time is the median of ${rows.rounds} runs, of ENN and EGG ${Math.ceil(rows.rounds / 2)}, in turn with each other, a run being the mean of as many estimates as ${rows.least} ms hold; half of them spread by less than ±${percent(median(spreads))}, the widest by ±${percent(Math.max(...spreads))}. The paper’s times are from an ${article.MACHINE}.`,
+    `${model}, ${cores} cores, Node ${node}, ${date}; took ${minutes.toFixed(1)} minutes. All times are of the single-threaded WebAssembly build in Node, on one core, in milliseconds: the phases inside the module, for all methods alike. The clouds lie in memory in random order, scans in that of their files. Each time is the median of ${rows.rounds} runs, of ENN and EGG ${Math.ceil(rows.rounds / 2)}, in turn with each other, a run being the median of as many estimates as ${rows.least} ms hold; half of them spread by less than ±${percent(median(spreads))}, the widest by ±${percent(Math.max(...spreads))}. The paper’s times are from an ${article.MACHINE}.`,
     "**ENN** is `method: 'knn'` with k = 16, **EGG** is `method: 'egg'` with k = 8; **L** is that of the paper’s Eq. 1, so that “1.0 L” is `cell: { scale: 1 }`, and **auto** is what the package does by itself. Errors are the paper’s deviation |n - n_true|, sign aside.",
     '## What the paper claims',
     claimed(rows),
@@ -154,7 +154,7 @@ function measuredBar(rows) {
         range(egg.totals, ratio),
       ]),
     ),
-    `The ratios are of medians; then of the fastest run of each, which what else the machine does hits least; then of what the caller waits for, with copies into the worker and out of it. At 1.0 L the ratio to ENN is lowest on ${filled(order[0])} and highest on ${filled(order.at(-1))}. The two bars stand apart, the two baselines do not: EGG takes ${range(ratios(compared(rows), 'egg', 'knn'), (value) => value.toFixed(2))} times as long as ENN.`,
+    `The ratios are medians of those of each round, in which the two ran seconds apart; then of the fastest run of each, which what else the machine does hits least; then of what the caller waits for, with copies into the worker and out of it. At 1.0 L the ratio to ENN is lowest on ${filled(order[0])} and highest on ${filled(order.at(-1))}. The two bars stand apart, the two baselines do not: EGG takes ${range(ratios(compared(rows), 'egg', 'knn'), (value) => value.toFixed(2))} times as long as ENN.`,
   );
 }
 
