@@ -9,7 +9,7 @@ use glam::{DVec3, UVec3};
 
 /// Points in an occupied cube that 'auto' begins with: so many that a smooth surface needs few cubes, and so few that
 /// what is not smooth needs only two or three divisions.
-const POINTS_PER_CELL: f64 = 32.0;
+pub(crate) const POINTS_PER_CELL: f64 = 32.0;
 
 /// Small clouds are given so many occupied cubes all the same, if these then hold as many points.
 const LEAST_CELLS: f64 = 50.0;
@@ -52,13 +52,13 @@ pub(crate) fn edge_of_size(size: f64, unit: f64) -> Result<f64, Error> {
     Err(Error::input(format_args!("cell.size is {size}, out of all proportion to the cloud; wanted another")))
 }
 
-/// The edge that puts [`POINTS_PER_CELL`] points into an occupied cube.
+/// The edge that puts `wanted` points into an occupied cube.
 ///
 /// The mean of 1 / (points in the cube of a point), taken over all points, is the share of occupied cubes in points.
 /// So a few points chosen at random ("probes") tell it without bias, whatever the extent of the cloud: the cubes round
 /// them are halved until they hold too few points. Stray points weigh as little as they are few.
 /// Costs one pass over the points.
-pub(crate) fn populated_edge(points: &Points, bounds: &Bounds, bulk: &Bulk) -> Result<f64, Error> {
+pub(crate) fn populated_edge(points: &Points, bounds: &Bounds, bulk: &Bulk, wanted: f64) -> Result<f64, Error> {
     let extent = if bulk.extent > 0.0 { bulk.extent } else { bounds.extent().max_element() };
     if extent <= 0.0 || bulk.sample.is_empty() {
         // One point, or hardly any that is finite.
@@ -67,7 +67,7 @@ pub(crate) fn populated_edge(points: &Points, bounds: &Bounds, bulk: &Bulk) -> R
     let probes = Probes::place(bulk, extent, bounds.finite);
     let counts = probes.count(points)?;
     // Points that coincide can't be told apart by any edge, so they count as one.
-    let wanted = POINTS_PER_CELL.min(bounds.finite as f64 / LEAST_CELLS).max(LEAST_POINTS_PER_CELL);
+    let wanted = wanted.min(bounds.finite as f64 / LEAST_CELLS).max(LEAST_POINTS_PER_CELL);
     let target = wanted * counts[LEVELS as usize];
     let Some(level) = counts.iter().position(|&count| count < target) else {
         return Ok(probes.edge);

@@ -9,7 +9,8 @@ use crate::grid::Grid;
 use crate::lattice::{CUBES, Lattice};
 use crate::nodes::{self, Node};
 use crate::normals::Found;
-use crate::options::{Cell, Method, Options};
+use crate::options::{Cell, Method, Options, Orient};
+use crate::orient::{Component, orient};
 use crate::points::{Bounds, Bulk, Points};
 use crate::progress::Progress;
 
@@ -50,6 +51,8 @@ pub struct Report {
     pub noise: Option<f64>,
     /// The sizes of the neighbourhoods that [`Cell::Auto`] chose, the smallest first.
     pub scales: Vec<Scale>,
+    /// The surfaces that [`Orient::Consistent`] and [`Orient::Outward`] gave one sign each, the largest first; only they do.
+    pub components: Option<Vec<Component>>,
     /// Points interpolated from 0, 1, 2, 3 and 4 nodes. Those from 0 took the nearest node or their own plane, or were
     /// found without nodes.
     pub nodes_used: [u64; 5],
@@ -85,16 +88,18 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     if points.len() >= u32::MAX as usize {
         return Err(Error::input(format_args!("the cloud has {} points; at most {} fit", points.len(), u32::MAX - 1)));
     }
-    let mut laps = Laps::start(progress);
+    let normals_only = !cfg!(feature = "full") || options.orient == Orient::None;
+    let first = progress.first(if normals_only { 1.0 } else { 0.8 });
+    let mut laps = Laps::start(&first);
 
-    progress.update("bounds", 0.0)?;
+    first.update("bounds", 0.0)?;
     let bounds = Bounds::of(points);
     laps.end("bounds");
 
     if !cfg!(feature = "full") {
         return adaptive(points, options, &bounds, laps);
     }
-    match (options.method, options.cell) {
+    let mut estimate = match (options.method, options.cell) {
         (Method::Bilinear, Cell::Auto) => adaptive(points, options, &bounds, laps),
         (Method::Bilinear, Cell::Scale(scale)) => {
             bilinear(points, options, scale * cell::paper_edge(bounds.extent(), bounds.finite), &bounds, laps)
@@ -108,7 +113,16 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
         (Method::Egg, _) => {
             baseline(points, options, Baseline::Egg { k: options.k.unwrap_or(8) as usize }, &bounds, laps)
         }
+    }?;
+    if !normals_only {
+        let mut laps = Laps::start(progress);
+        let normals = bytemuck::cast_slice_mut(&mut estimate.normals);
+        let stage = progress.stage("orientation", 0.8..1.0);
+        estimate.report.components = orient(points, normals, &bounds, options.orient, &stage)?;
+        laps.end("orientation");
+        estimate.report.milliseconds.append(&mut laps.ended);
     }
+    Ok(estimate)
 }
 
 /// What both kinds of cells have to tell; the rest is left at its default.
@@ -130,7 +144,7 @@ fn adaptive(points: &Points, options: &Options, bounds: &Bounds, mut laps: Laps)
     let progress = laps.progress;
     progress.update("cellSize", 0.03)?;
     let bulk = Bulk::of_points(points);
-    let edge = cell::populated_edge(points, bounds, &bulk)?;
+    let edge = cell::populated_edge(points, bounds, &bulk, cell::POINTS_PER_CELL)?;
     let lattice = Lattice::new(bounds, &|| bulk.median, edge, adaptive::CUBES);
     laps.end("cellSize");
     let lap = &mut |phase| laps.end(phase);

@@ -59,18 +59,19 @@ pub enum Orient {
     /// Deterministic, and nothing more: `x + 2y + 4z >= 0` for every normal.
     #[default]
     None,
-    /// One sign for each connected surface.
+    /// One sign for each connected surface: outwards where one side of it lies in the open, otherwise away from the middle of
+    /// the surface. For anything; [`crate::Report::components`] tells how sure it is.
     Consistent,
-    /// Outwards, for closed surfaces.
+    /// The same, with more weight on what lies in the open: for closed objects, above all thin and noisy ones.
     Outward,
-    /// Towards a position, in the coordinates of the input.
+    /// Towards a position, in the coordinates of the input: for what was scanned from there.
     Viewpoint([f64; 3]),
-    /// Towards a direction.
+    /// Towards a direction of any length: for terrain.
     Up([f64; 3]),
 }
 
 impl Options {
-    /// Refuses values out of range, and what this version, or without the feature `full` this build, does not offer.
+    /// Refuses values out of range, and without the feature `full` what this build does not offer.
     pub fn validate(&self) -> Result<(), Error> {
         if !cfg!(feature = "full") {
             let offered = Self { curvature: self.curvature, ..Self::default() };
@@ -93,16 +94,18 @@ impl Options {
         {
             return Err(Error::input(format_args!("k is {k}; wanted a whole number of at least {LEAST_NEIGHBOURS}")));
         }
-        let unsupported = |what: &str, offered: &str| {
-            Err(Error::Unsupported(format!("{what} is not in this version; it offers {offered}")))
+        let vector = |name: &str, [x, y, z]: [f64; 3], wanted: &str| {
+            let [x, y, z] = [x, y, z].map(text);
+            Err(Error::Input(format!("orient.{name} is {x}, {y}, {z}; wanted {wanted}")))
         };
         match self.orient {
-            Orient::None => {}
-            Orient::Consistent => return unsupported("orient 'consistent'", "'none'"),
-            Orient::Outward => return unsupported("orient 'outward'", "'none'"),
-            Orient::Viewpoint(_) => return unsupported("orient by viewpoint", "'none'"),
-            Orient::Up(_) => return unsupported("orient by up direction", "'none'"),
+            Orient::Viewpoint(viewpoint) if !viewpoint.iter().all(|x| x.is_finite()) => {
+                vector("viewpoint", viewpoint, "three finite numbers")
+            }
+            Orient::Up(up) if !up.iter().all(|x| x.is_finite()) || up == [0.0; 3] => {
+                vector("up", up, "three finite numbers, not all 0")
+            }
+            _ => Ok(()),
         }
-        Ok(())
     }
 }

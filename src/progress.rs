@@ -13,18 +13,25 @@ type Observer<'a> = dyn Fn(&'static str, f64) -> ControlFlow<()> + 'a;
 pub struct Progress<'a> {
     observer: &'a Observer<'a>,
     clock: &'a dyn Fn() -> f64,
+    /// The share of the whole call that is told of.
+    share: f64,
 }
 
 impl<'a> Progress<'a> {
     /// `observer(phase, fraction)` hears a fraction that rises from 0 to 1 over the whole call, and answers
     /// `Break` to stop it with [`Error::Cancelled`]; `clock()` is in milliseconds from any beginning.
     pub fn new(observer: &'a Observer<'a>, clock: &'a dyn Fn() -> f64) -> Self {
-        Self { observer, clock }
+        Self { observer, clock, share: 1.0 }
     }
 
     /// A `Progress` that nobody listens to. All times in the report are 0.
     pub fn silent() -> Progress<'static> {
-        Progress { observer: &|_, _| ControlFlow::Continue(()), clock: &|| 0.0 }
+        Progress { observer: &|_, _| ControlFlow::Continue(()), clock: &|| 0.0, share: 1.0 }
+    }
+
+    /// The same for a call of which all that comes is the first `share`.
+    pub(crate) fn first(&self, share: f64) -> Self {
+        Self { share, ..*self }
     }
 
     /// The part of the call that goes from `share.start` to `share.end` of the whole.
@@ -34,7 +41,7 @@ impl<'a> Progress<'a> {
 
     /// Tells the observer that `phase` stands at `fraction` of the whole call.
     pub(crate) fn update(&self, phase: &'static str, fraction: f64) -> Result<(), Error> {
-        match (self.observer)(phase, fraction) {
+        match (self.observer)(phase, self.share * fraction) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Error::Cancelled),
         }
@@ -60,13 +67,17 @@ impl Stage<'_> {
         let batch = 64 * parallel::threads();
         let mut done = 0;
         while done < count {
-            let fraction = done as f64 / count as f64;
-            self.progress.update(self.phase, self.share.start + (self.share.end - self.share.start) * fraction)?;
+            self.tell(done as f64 / count as f64)?;
             let length = batch.min(count - done);
             parallel::each(length, &|i| work(done + i));
             done += length;
         }
-        self.progress.update(self.phase, self.share.end)
+        self.tell(1.0)
+    }
+
+    /// Tells the observer that `fraction` of this part is done, and lets it stop the call.
+    pub fn tell(&self, fraction: f64) -> Result<(), Error> {
+        self.progress.update(self.phase, self.share.start + (self.share.end - self.share.start) * fraction)
     }
 
     /// The part of this part that goes from `share.start` to `share.end` of it.

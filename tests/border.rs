@@ -239,13 +239,6 @@ fn wrong_options_are_refused_with_what_came_and_what_was_wanted() {
 }
 
 #[wasm_bindgen_test]
-fn what_this_version_lacks_is_unsupported_and_says_what_it_offers() {
-    let (code, message) = thrown(estimate(floats(&[]), false, &options(r#"{ "orient": "outward" }"#), &nobody()));
-    assert_eq!(code, "unsupported");
-    assert!(message.contains("'none'"), "{message}");
-}
-
-#[wasm_bindgen_test]
 fn bytes_that_are_not_whole_points_are_refused() {
     let (code, message) = thrown(estimate(filled(&[0; 20]), false, &options("{}"), &nobody()));
     assert_eq!((code.as_str(), message.as_str()), ("input", "positions has 20 bytes; wanted a multiple of 12"));

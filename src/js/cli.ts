@@ -274,6 +274,7 @@ function format(report: Report, { method = 'bilinear' }: EstimateOptions): strin
     ['method', method],
     // The others have none.
     ...(method === 'bilinear' ? adaptive || fixed : []),
+    ...surfaces(report.components),
     ['threads', report.threads + (report.fallbackReason ? ` (${report.fallbackReason})` : '')],
     ['memory', `${short(report.peakBytes / 2 ** 20)} MiB at most`],
     [
@@ -284,6 +285,16 @@ function format(report: Report, { method = 'bilinear' }: EstimateOptions): strin
     ],
   ];
   return rows.map(([name, text]) => `${name!.padEnd(11)} ${text}\n`).join('');
+}
+
+/** The largest of the surfaces that were given one sign each; all of many would not fit a screen. */
+function surfaces(components: Report['components'] = []): [string, string][] {
+  const shown = components.slice(0, 4).map(({ points, side, confidence }) => {
+    const sure = `${Math.round(100 * confidence)} % sure`;
+    return `${points.toLocaleString('en')} points ${side === 'air' ? 'outwards' : 'away from the middle'}, ${sure}`;
+  });
+  if (components.length > shown.length) shown.push(`${(components.length - shown.length).toLocaleString('en')} smaller`);
+  return shown.map((text, i) => [i === 0 ? 'surfaces' : '', text]);
 }
 
 try {

@@ -32,7 +32,12 @@ export interface EstimateOptions {
    * besides it (default 8).
    */
   k?: number;
-  /** How signs are chosen. Default `'none'`: deterministic, and nothing more. */
+  /**
+   * How signs are chosen. Default `'none'`: `x + 2y + 4z >= 0`, deterministic and nothing more. `'consistent'`: one sign for
+   * each connected surface, outwards where one side of it lies in the open, otherwise away from the middle of the surface.
+   * `'outward'`: the same with more weight on what lies in the open, for closed objects, above all thin and noisy ones.
+   * `viewpoint`: towards a position, in the coordinates of `positions`. `up`: towards a direction, for terrain.
+   */
   orient?:
     'none' | 'consistent' | 'outward' | { viewpoint: [number, number, number] } | { up: [number, number, number] };
   /** Also return `curvature`, 4 bytes a point. Default false. */
@@ -88,6 +93,12 @@ export interface Report {
   scales?: { cellSize: number; points: number }[];
   /** Points interpolated from 0, 1, 2, 3 and 4 nodes; all from 0 for the baselines and with `cell: 'auto'`. */
   nodesUsed: [number, number, number, number, number];
+  /**
+   * The surfaces that were given one sign each, the largest first. `side` tells by what: `'air'`, because the open air lies
+   * on one side only; `'volume'`, away from the middle of what is open to both. `confidence`: how much more of the evidence
+   * speaks for that side than for the other, from 0, a guess, to 1. Only with `orient: 'consistent'` and `'outward'`.
+   */
+  components?: { points: number; side: 'air' | 'volume'; confidence: number }[];
   /**
    * Each phase in the wasm module, and `total`: from the moment the call left the queue to its result in the calling
    * thread, so with the start of the worker if this call needed one, and with copying in and out.

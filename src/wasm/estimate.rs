@@ -60,6 +60,17 @@ fn describe(report: &Report) -> Object {
         set(&object, "scales", scales);
     }
     set(&object, "nodesUsed", array(&report.nodes_used));
+    if let Some(components) = &report.components {
+        let list = Array::new();
+        for component in components {
+            let object = Object::new();
+            set(&object, "points", component.points as f64);
+            set(&object, "side", component.side.name());
+            set(&object, "confidence", component.confidence);
+            list.push(&object);
+        }
+        set(&object, "components", list);
+    }
     let milliseconds = Object::new();
     for &(phase, time) in &report.milliseconds {
         set(&milliseconds, phase, time);

@@ -1,0 +1,194 @@
+//! One sign for each patch: groups of them that agree, merged from the strongest evidence to the weakest, then mended.
+
+use super::links::{Link, Links};
+use crate::error::Error;
+use crate::points::reserve;
+use crate::progress::Stage;
+
+/// The signs of all patches, and which of them hang together.
+pub(super) struct Signs {
+    /// For each patch whether its normal must be flipped.
+    pub flipped: Vec<bool>,
+    /// For each patch the number of its component.
+    pub component: Vec<u32>,
+    pub components: usize,
+}
+
+/// The groups of one step, and to which group of the next each belongs.
+struct Level {
+    links: Links,
+    /// For each group, what speaks for its sign by itself.
+    own: Vec<f32>,
+    /// The group of the next level.
+    group: Vec<u32>,
+    /// Whether it is flipped in it.
+    flipped: Vec<bool>,
+}
+
+/// Chooses the signs that make the sum of all evidence large: of the links between two patches, and `own`, what speaks
+/// for a patch not to be flipped.
+///
+/// Rounds of Boruvka's: every group merges with the one that it has the strongest evidence for or against, and the evidence
+/// between the merged ones is added up, so that many weak links outvote a strong wrong one. A round at least halves the
+/// groups that have links: linear in the links. Then back from the last to the first: whatever gains by being flipped is.
+pub(super) fn signs(links: Links, own: Vec<f32>, stage: &Stage) -> Result<Signs, Error> {
+    let patches = links.len();
+    let mut levels = Vec::new();
+    let (mut links, mut own) = (links, own);
+    let mut component: Vec<u32> = (0..patches as u32).collect();
+    let mut count = patches;
+    stage.tell(0.0)?;
+    while let Some((group, flipped, groups)) = merge(&links) {
+        let (merged, sums) = gather(&links, &own, &group, &flipped, groups)?;
+        component.iter_mut().for_each(|component| *component = group[*component as usize]);
+        levels.push(Level {
+            links: std::mem::replace(&mut links, merged),
+            own: std::mem::replace(&mut own, sums),
+            group,
+            flipped,
+        });
+        count = groups;
+        stage.tell(0.7 * (1.0 - count as f64 / patches as f64))?;
+    }
+    let mut flipped: Vec<bool> = own.iter().map(|own| *own < 0.0).collect();
+    while let Some(level) = levels.pop() {
+        flipped = level.group.iter().zip(&level.flipped).map(|(&group, own)| own ^ flipped[group as usize]).collect();
+        mend(&level.links, &level.own, &mut flipped);
+    }
+    stage.tell(1.0)?;
+    Ok(Signs { flipped, component, components: count })
+}
+
+/// The group of each, and whether it is flipped against the group's first; and how many groups. `None` when no two are
+/// linked any more.
+fn merge(links: &Links) -> Option<(Vec<u32>, Vec<bool>, usize)> {
+    let count = links.len();
+    // Towards the root of the group, and whether flipped against it.
+    let mut parents: Vec<(u32, bool)> = (0..count as u32).map(|one| (one, false)).collect();
+    let mut is_merged = false;
+    for one in 0..count {
+        let mut best = Link { to: 0, evidence: 0.0 };
+        for &link in links.from(one) {
+            let (more, most) = (link.evidence.abs(), best.evidence.abs());
+            if more > most || (more == most && link.to < best.to) {
+                best = link;
+            }
+        }
+        if best.evidence == 0.0 {
+            continue;
+        }
+        let ((a, a_flipped), (b, b_flipped)) = (root(&mut parents, one as u32), root(&mut parents, best.to));
+        if a != b {
+            parents[a.max(b) as usize] = (a.min(b), a_flipped ^ b_flipped ^ (best.evidence < 0.0));
+            is_merged = true;
+        }
+    }
+    if !is_merged {
+        return None;
+    }
+    let (mut group, mut flipped) = (vec![0; count], vec![false; count]);
+    let mut groups = 0;
+    for one in 0..count {
+        let (root, is_flipped) = root(&mut parents, one as u32);
+        // The root is the lowest of its group.
+        group[one] = if root as usize == one { groups } else { group[root as usize] };
+        groups += u32::from(root as usize == one);
+        flipped[one] = is_flipped;
+    }
+    Some((group, flipped, groups as usize))
+}
+
+/// The root of one, and whether it is flipped against that; halves the way there.
+fn root(parents: &mut [(u32, bool)], mut one: u32) -> (u32, bool) {
+    let mut flipped = false;
+    loop {
+        let (parent, own) = parents[one as usize];
+        if parent == one {
+            return (one, flipped);
+        }
+        let (next, more) = parents[parent as usize];
+        if next != parent {
+            parents[one as usize] = (next, own ^ more);
+        }
+        flipped ^= own;
+        one = parent;
+    }
+}
+
+/// The links between groups, and what speaks for the sign of each by itself.
+fn gather(
+    links: &Links,
+    own: &[f32],
+    group: &[u32],
+    flipped: &[bool],
+    groups: usize,
+) -> Result<(Links, Vec<f32>), Error> {
+    const WHAT: &str = "the graph of patches";
+    let mut sums = Vec::new();
+    reserve(&mut sums, groups, WHAT)?;
+    sums.resize(groups, 0.0);
+    // The members of each group, one after the other.
+    let mut ends = vec![0u32; groups + 1];
+    for (one, &group) in group.iter().enumerate() {
+        sums[group as usize] += if flipped[one] { -own[one] } else { own[one] };
+        ends[group as usize + 1] += 1;
+    }
+    for i in 0..groups {
+        ends[i + 1] += ends[i];
+    }
+    let mut next = ends.clone();
+    let mut members = vec![0u32; group.len()];
+    for (one, &group) in group.iter().enumerate() {
+        members[next[group as usize] as usize] = one as u32;
+        next[group as usize] += 1;
+    }
+    let mut merged = Links::default();
+    reserve(&mut merged.first, groups + 1, WHAT)?;
+    merged.first.push(0);
+    // Where the link to a group stands; none before the own start.
+    let mut places = vec![u32::MAX; groups];
+    for one in 0..groups {
+        let start = merged.all.len();
+        for &member in &members[ends[one] as usize..ends[one + 1] as usize] {
+            for link in links.from(member as usize) {
+                let to = group[link.to as usize];
+                if to as usize == one {
+                    continue;
+                }
+                let is_flipped = flipped[member as usize] ^ flipped[link.to as usize];
+                let evidence = if is_flipped { -link.evidence } else { link.evidence };
+                let place = places[to as usize] as usize;
+                if place >= start && place < merged.all.len() && merged.all[place].to == to {
+                    merged.all[place].evidence += evidence;
+                } else {
+                    places[to as usize] = merged.all.len() as u32;
+                    merged.all.push(Link { to, evidence });
+                }
+            }
+        }
+        merged.first.push(merged.all.len() as u32);
+    }
+    Ok((merged, sums))
+}
+
+/// Flips what gains by it, until nothing does; each flip raises the sum of all evidence.
+fn mend(links: &Links, own: &[f32], flipped: &mut [bool]) {
+    const ROUNDS: usize = 16;
+    let gains = |one: usize, flipped: &[bool]| {
+        let side = |is_flipped: bool, evidence: f32| if is_flipped { -evidence } else { evidence };
+        let sum: f32 = links.from(one).iter().map(|link| side(flipped[link.to as usize], link.evidence)).sum();
+        side(flipped[one], own[one] + sum) < -1e-6
+    };
+    for _ in 0..ROUNDS {
+        let mut any = false;
+        for one in 0..flipped.len() {
+            if gains(one, flipped) {
+                flipped[one] = !flipped[one];
+                any = true;
+            }
+        }
+        if !any {
+            break;
+        }
+    }
+}
