@@ -18,35 +18,35 @@ const HALF: f32 = 9.0;
 /// For each patch, what speaks for its normal to point outwards: near 1 where it looks into the open and its back does
 /// not, -1 where it is the other way round, 0 where neither does, or both.
 ///
-/// A patch looks into the open in a direction in which no voxel (twice a cube, or more in a large empty box) between its own
-/// and the end of the box is occupied. Each direction is one sweep over the bits of all voxels, 64 at a time; so are the
-/// patches asked. After the visibility votes of Takayama, Jacobson, Kavan and Sorkine-Hornung, "Consistently orienting
+/// A patch looks into the open in a direction in which no voxel (a cube, or more in a large empty box) between its own and
+/// the end of the box is occupied. Each direction is one sweep over the bits of all voxels, 64 at a time. After the visibility votes of Takayama, Jacobson, Kavan and Sorkine-Hornung, "Consistently orienting
 /// facets in polygon meshes by minimizing the Dirichlet energy of generalized winding numbers" and its ray-shooting
 /// variant, 2014.
 pub(super) fn exposure(grid: &Grid, patches: &Patches, points: usize, stage: &Stage) -> Result<Vec<f32>, Error> {
     let voxels = Voxels::of(grid, points)?;
     let mut seen: Vec<AtomicU32> = Vec::new();
-    reserve(&mut seen, patches.all.len(), "the open sides")?;
-    seen.resize_with(patches.all.len(), AtomicU32::default);
+    reserve(&mut seen, grid.cubes(), "the open sides")?;
+    seen.resize_with(grid.cubes(), AtomicU32::default);
     stage.run(DIRECTIONS, &|number| {
         let open = voxels.open(direction(number));
-        for (brick, &place) in grid.bricks.places.iter().enumerate() {
-            let first = grid.first_cube[brick] as usize;
-            for (cube, bit) in (first..).zip(set_bits(grid.masks[brick])) {
+        let mut seen = seen.iter();
+        for (&place, &mask) in grid.bricks.places.iter().zip(&grid.masks) {
+            for (bit, seen) in set_bits(mask).zip(&mut seen) {
                 if open.holds(voxels.of_cube(place, bit)) {
-                    for patch in patches.first[cube]..patches.first[cube + 1] {
-                        seen[patch as usize].fetch_or(1 << number, Relaxed);
-                    }
+                    seen.fetch_or(1 << number, Relaxed);
                 }
             }
         }
     })?;
     let along: [Vec3; DIRECTIONS] = std::array::from_fn(|number| direction(number).as_vec3().normalize() / HALF);
-    let exposure = |(seen, normal): (AtomicU32, Vec3)| {
+    let mut exposure = Vec::new();
+    reserve(&mut exposure, patches.all.len(), "the open sides")?;
+    for (seen, ends) in seen.into_iter().zip(patches.first.windows(2)) {
         let open: Vec3 = set_bits(seen.into_inner().into()).map(|number| along[number as usize]).sum();
-        open.dot(normal)
-    };
-    Ok(seen.into_iter().zip(patches.all.iter().map(|patch| patch.normal)).map(exposure).collect())
+        let own = &patches.all[ends[0] as usize..ends[1] as usize];
+        exposure.extend(own.iter().map(|patch| open.dot(patch.normal)));
+    }
+    Ok(exposure)
 }
 
 fn direction(number: usize) -> IVec3 {
@@ -82,7 +82,7 @@ impl Voxels {
         let cubes = if grid.bricks.places.is_empty() { IVec3::ZERO } else { 4 * (high + 1) - first };
         // Two bits a point, and no less than is done at once.
         let most = (16.0 * points as f64).max(4e6);
-        let mut doublings = 1;
+        let mut doublings = 0;
         let size = loop {
             let size: IVec3 = (cubes + ((1 << doublings) - 1)) >> doublings;
             if f64::from((size.x + 63) & !63) * f64::from(size.y) * f64::from(size.z) <= most {

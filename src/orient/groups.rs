@@ -50,17 +50,57 @@ pub(super) fn signs(links: Links, own: Vec<f32>, stage: &Stage) -> Result<Signs,
         count = groups;
         stage.tell(0.7 * (1.0 - count as f64 / patches as f64))?;
     }
-    let mut flipped: Vec<bool> = own.iter().map(|own| *own < 0.0).collect();
-    while let Some(level) = levels.pop() {
-        flipped = level.group.iter().zip(&level.flipped).map(|(&group, own)| own ^ flipped[group as usize]).collect();
-        mend(&level.links, &level.own, &mut flipped);
+    // From the last level to the first; `trust` is the weight of what speaks for a sign by itself.
+    let descend = |trust: f32| {
+        let mut flipped: Vec<bool> = own.iter().map(|own| *own < 0.0).collect();
+        for Level { links, own, group, flipped: within } in levels.iter().rev() {
+            flipped = group.iter().zip(within).map(|(&group, within)| within ^ flipped[group as usize]).collect();
+            mend(links, own, trust, &mut flipped);
+        }
+        flipped
+    };
+    let mut flipped = descend(1.0);
+    if let Some(Level { links, own, .. }) = levels.first() {
+        // Flipping one small group after the other does not reach a far better choice behind worse ones, as where both
+        // sides of a thin noisy wall were taken for one.
+        stage.tell(0.8)?;
+        let bold = descend(BOLDNESS);
+        let mut gains = vec![0.0; count];
+        for (one, &component) in component.iter().enumerate() {
+            gains[component as usize] += score(links, own, &bold, one) - score(links, own, &flipped, one);
+        }
+        for ((flipped, bold), &component) in flipped.iter_mut().zip(bold).zip(&component) {
+            if gains[component as usize] > 0.0 {
+                *flipped = bold;
+            }
+        }
+        mend(links, own, 1.0, &mut flipped);
     }
     stage.tell(1.0)?;
     Ok(Signs { flipped, component, components: count })
 }
 
+/// How much more than by rights the second choice trusts what speaks for a sign by itself.
+const BOLDNESS: f32 = 3.0;
+
+fn signed(is_flipped: bool, evidence: f32) -> f32 {
+    if is_flipped { -evidence } else { evidence }
+}
+
+/// What the evidence says to the sign of one, given those of the others.
+fn support(links: &Links, flipped: &[bool], one: usize) -> f32 {
+    let sum: f32 = links.from(one).iter().map(|link| signed(flipped[link.to as usize], link.evidence)).sum();
+    signed(flipped[one], sum)
+}
+
+/// The share of one in the sum of all evidence: half of each of its links.
+fn score(links: &Links, own: &[f32], flipped: &[bool], one: usize) -> f64 {
+    f64::from(support(links, flipped, one)) / 2.0 + f64::from(signed(flipped[one], own[one]))
+}
+
 /// The group of each, and whether it is flipped against the group's first; and how many groups. `None` when no two are
 /// linked any more.
+#[inline(never)]
 fn merge(links: &Links) -> Option<(Vec<u32>, Vec<bool>, usize)> {
     let count = links.len();
     // Towards the root of the group, and whether flipped against it.
@@ -116,6 +156,7 @@ fn root(parents: &mut [(u32, bool)], mut one: u32) -> (u32, bool) {
 }
 
 /// The links between groups, and what speaks for the sign of each by itself.
+#[inline(never)]
 fn gather(
     links: &Links,
     own: &[f32],
@@ -172,17 +213,15 @@ fn gather(
 }
 
 /// Flips what gains by it, until nothing does; each flip raises the sum of all evidence.
-fn mend(links: &Links, own: &[f32], flipped: &mut [bool]) {
+#[inline(never)]
+fn mend(links: &Links, own: &[f32], trust: f32, flipped: &mut [bool]) {
     const ROUNDS: usize = 16;
-    let gains = |one: usize, flipped: &[bool]| {
-        let side = |is_flipped: bool, evidence: f32| if is_flipped { -evidence } else { evidence };
-        let sum: f32 = links.from(one).iter().map(|link| side(flipped[link.to as usize], link.evidence)).sum();
-        side(flipped[one], own[one] + sum) < -1e-6
-    };
+    /// Less is rounding.
+    const LEAST: f32 = 1e-6;
     for _ in 0..ROUNDS {
         let mut any = false;
         for one in 0..flipped.len() {
-            if gains(one, flipped) {
+            if support(links, flipped, one) + signed(flipped[one], trust * own[one]) < -LEAST {
                 flipped[one] = !flipped[one];
                 any = true;
             }

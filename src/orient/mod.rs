@@ -20,7 +20,7 @@ use crate::progress::Stage;
 use glam::{DVec3, Vec3};
 use groups::Signs;
 use links::Links;
-use patches::{NONE, Patches};
+use patches::Patches;
 
 /// One surface in itself: what is not linked to any other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,8 +52,14 @@ impl Side {
     }
 }
 
-/// Points in a cube: few, so that a cube holds little more than one piece of surface.
-const POINTS_PER_CELL: f64 = 4.0;
+/// Points in a cube: as many as tell noise from a wall.
+const POINTS_PER_CELL: f64 = 16.0;
+
+/// Where points lie further off their planes, in edges, the cubes are too small: uniform points in a cube lie 0.29 off its
+/// middle.
+const LARGEST_NOISE: f32 = 0.24;
+const ENLARGEMENT: f64 = 1.25;
+const ENLARGEMENTS: u32 = 3;
 
 /// Where less of the surface than this looks into the open on one side only, the air says nothing.
 const LEAST_CONFIDENCE: f64 = 0.2;
@@ -109,18 +115,34 @@ fn surfaces(
     trust: f32,
     stage: &Stage,
 ) -> Result<Vec<Component>, Error> {
-    let bulk = Bulk::of_points(points);
-    let edge = cell::populated_edge(points, bounds, &bulk, POINTS_PER_CELL)?;
-    let lattice = Lattice::new(bounds, &|| bulk.median, edge, CUBES);
-    let (grid, _) = Grid::sort(points, &lattice, &stage.part(0.0..0.3), |_, _| ())?;
-    let patches = Patches::of(&grid, normals, &stage.part(0.3..0.45))?;
-    let exposure = air::exposure(&grid, &patches, points.len(), &stage.part(0.45..0.55))?;
+    let (grid, noise) = sort(points, normals, bounds, &stage.part(0.0..0.35))?;
+    let patches = Patches::of(&grid, normals, noise, &stage.part(0.35..0.5))?;
+    let exposure = air::exposure(&grid, &patches, points.len(), &stage.part(0.5..0.55))?;
     let links = Links::of(&grid, &patches, &stage.part(0.55..0.7))?;
     let evidence = exposure.iter().map(|exposure| trust * exposure).collect();
     let mut signs = groups::signs(links, evidence, &stage.part(0.7..0.95))?;
     let components = decide(&grid, &patches, &exposure, &mut signs);
     turn(&grid, &patches, &signs.flipped, normals, &stage.part(0.95..1.0))?;
     Ok(components)
+}
+
+/// Cubes of a few points, and the noise in their edges: cubes so large that a noisy surface is no thicker than one.
+fn sort(points: &Points, normals: &[Vec3], bounds: &Bounds, stage: &Stage) -> Result<(Grid, f32), Error> {
+    let bulk = Bulk::of_points(points);
+    let mut edge = cell::populated_edge(points, bounds, &bulk, POINTS_PER_CELL)?;
+    let mut enlargements = 0;
+    loop {
+        let start = f64::from(enlargements) / f64::from(ENLARGEMENTS + 1);
+        let own = stage.part(start..start + 1.0 / f64::from(ENLARGEMENTS + 1));
+        let lattice = Lattice::new(bounds, &|| bulk.median, edge, CUBES);
+        let (grid, _) = Grid::sort(points, &lattice, &own, |_, _| ())?;
+        let noise = patches::noise(&grid, normals);
+        if noise <= LARGEST_NOISE || enlargements == ENLARGEMENTS {
+            return Ok((grid, noise));
+        }
+        edge *= ENLARGEMENT;
+        enlargements += 1;
+    }
 }
 
 /// Sums over a component, with its normals as they were signed.
@@ -193,15 +215,14 @@ fn turn(grid: &Grid, patches: &Patches, flipped: &[bool], normals: &mut [Vec3], 
             let first = grid.first_cube[brick] as usize;
             let mut start = grid.first_point[brick] as usize;
             for (cube, (points, _)) in (first..).zip(grid.cubes_of(brick)) {
-                for (placed, &number) in points.iter().zip(&patches.of_point[start..]) {
-                    if number == NONE {
-                        continue;
-                    }
-                    let patch = patches.first[cube] as usize + usize::from(number);
-                    let point = placed.point as usize;
-                    // SAFETY: every point of the input stands in the grid once at the most.
-                    let normal = &mut unsafe { normals.slice(point..point + 1) }[0];
-                    if (normal.dot(patches.all[patch].normal) < 0.0) ^ flipped[patch] {
+                let patches_of_cube = patches.first[cube] as usize;
+                for (placed, membership) in points.iter().zip(&patches.of_point[start..]) {
+                    if let Some((number, is_opposite)) = membership.patch()
+                        && is_opposite != flipped[patches_of_cube + number]
+                    {
+                        let point = placed.point as usize;
+                        // SAFETY: every point of the input stands in the grid once at the most.
+                        let normal = &mut unsafe { normals.slice(point..point + 1) }[0];
                         *normal = flip(*normal);
                     }
                 }

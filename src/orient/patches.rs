@@ -25,38 +25,63 @@ pub(super) struct Patches {
     pub all: Vec<Patch>,
     /// For each cube its first patch; one more at the end.
     pub first: Vec<u32>,
-    /// For each point, as the grid sorts them, the number of its patch among those of its cube; [`NONE`] without a normal.
-    pub of_point: Vec<u8>,
+    /// For each point, as the grid sorts them, its place in one.
+    pub of_point: Vec<Membership>,
 }
 
-/// The patch of a point without a normal.
-pub(super) const NONE: u8 = u8::MAX;
+/// The patch of a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Membership(u8);
+
+impl Membership {
+    /// That of a point without a normal.
+    const NONE: Self = Self(u8::MAX);
+    const OPPOSITE: u8 = 0x80;
+
+    /// The number of the patch among those of the cube, and whether the point's normal is opposite to that of the patch.
+    #[inline(always)]
+    pub fn patch(self) -> Option<(usize, bool)> {
+        (self.0 != Self::NONE.0).then_some((usize::from(self.0 & !Self::OPPOSITE), self.0 & Self::OPPOSITE != 0))
+    }
+}
 
 /// Patches of a cube at the most: more are a tangle, and its points join whichever is nearest.
 const MOST: usize = 16;
 
-/// The normals of a patch lie within 45 degrees of their mean: its cosine, squared.
-const COSINE_SQUARED: f32 = 0.5;
+/// The normals of a patch lie within 32 degrees of their mean: its cosine, squared.
+const COSINE_SQUARED: f32 = 0.72;
 
-/// How far from the plane of a patch a point may lie to join it, in edges. Thin walls have both sides in one cube.
-const THICKNESS: f32 = 0.2;
+/// How far from the plane of a patch a point may lie to join it, in edges: little, because thin walls have both sides in one
+/// cube; but noise must not tear a surface into layers, so no less than so many times the noise.
+const THICKNESS: f32 = 0.1;
+const DEVIATIONS: f32 = 2.5;
 
 impl Patches {
-    /// One pass over the points.
-    pub fn of(grid: &Grid, normals: &[Vec3], stage: &Stage) -> Result<Self, Error> {
+    /// One pass over the points; `noise` is that of [`noise`].
+    pub fn of(grid: &Grid, normals: &[Vec3], noise: f32, stage: &Stage) -> Result<Self, Error> {
+        let thickness = THICKNESS.max(DEVIATIONS * noise);
         let of_point = Filling::new(grid.placed.len(), "the patches")?;
         let counts = Filling::<u32>::new(grid.cubes(), "the patches")?;
         let found = Gathering::new("the patches");
         stage.run(grid.blocks.len(), &|block| {
-            let (mut patches, mut cloud) = (Vec::new(), Vec::new());
-            for brick in grid.blocks[block].clone() {
-                let mut start = grid.first_point[brick] as usize;
+            let (mut patches, mut members) = (Vec::new(), Vec::new());
+            let bricks = grid.blocks[block].clone();
+            let start = grid.first_point[bricks.start] as usize;
+            let end = grid.first_point[bricks.end] as usize;
+            // All at once, so that the processor waits for many places of memory at a time and not for one after the other.
+            let normals: Vec<Vec3> =
+                grid.placed[start..end].iter().map(|placed| normals[placed.point as usize]).collect();
+            let mut normals = &normals[..];
+            // SAFETY: a cube belongs to one brick, and a brick to one block.
+            let mut of_point = unsafe { of_point.slice(start..end) };
+            for brick in bricks {
                 for (cube, (points, bit)) in (grid.first_cube[brick] as usize..).zip(grid.cubes_of(brick)) {
                     let before = patches.len();
-                    // SAFETY: a cube belongs to one brick, and a brick to one block.
-                    let of_point = unsafe { of_point.slice(start..start + points.len()) };
-                    split(points, cube_centre(bit), normals, &mut cloud, &mut patches, of_point);
-                    start += points.len();
+                    let (own, others) = normals.split_at(points.len());
+                    normals = others;
+                    let (memberships, others) = of_point.split_at_mut(points.len());
+                    of_point = others;
+                    split(points, own, cube_centre(bit), thickness, &mut members, &mut patches, memberships);
                     // SAFETY: as above.
                     unsafe { counts.write(cube, (patches.len() - before) as u32) };
                 }
@@ -84,34 +109,75 @@ impl Patches {
     }
 }
 
+/// How far points lie off their cube's plane, in edges: the root mean square that half of the cubes do not exceed. Looks at
+/// every eighth brick.
+pub(super) fn noise(grid: &Grid, normals: &[Vec3]) -> f32 {
+    const STEP: usize = 8;
+    /// Fewer points lie on a plane in any case.
+    const LEAST: usize = 4;
+    let mut deviations = Vec::new();
+    for brick in (0..grid.bricks.len()).step_by(STEP) {
+        for (points, _) in grid.cubes_of(brick).filter(|(points, _)| points.len() >= LEAST) {
+            let (mut place, mut normal) = (Vec3::ZERO, Vec3::ZERO);
+            for point in points {
+                let own = normals[point.point as usize];
+                place += point.local;
+                normal += if normal.dot(own) < 0.0 { -own } else { own };
+            }
+            let (place, normal) = (place / points.len() as f32, normal.normalize_or_zero());
+            let squares = points.iter().map(|point| (point.local - place).dot(normal)).map(|off| off * off);
+            deviations.push((squares.sum::<f32>() / points.len() as f32).sqrt());
+        }
+    }
+    let middle = deviations.len() / 2;
+    if deviations.is_empty() { 0.0 } else { *deviations.select_nth_unstable_by(middle, f32::total_cmp).1 }
+}
+
+/// Sorts by place. Most cubes have few members, and for these nothing is faster.
+fn sort(members: &mut [Member]) {
+    const FEW: usize = 32;
+    let order =
+        |(a, ..): &Member, (b, ..): &Member| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z));
+    if members.len() > FEW {
+        members.sort_unstable_by(order);
+        return;
+    }
+    for end in 1..members.len() {
+        let mut i = end;
+        while i > 0 && order(&members[i], &members[i - 1]).is_lt() {
+            members.swap(i, i - 1);
+            i -= 1;
+        }
+    }
+}
+
 /// A point of a cube: its place against the cube's centre, its normal, and its number among the points of the cube.
 type Member = (Vec3, Vec3, u32);
 
-/// Parts the points of one cube.
+/// Parts the points of one cube; `normals` are theirs.
 fn split(
     points: &[Placed],
-    centre: Vec3,
     normals: &[Vec3],
+    centre: Vec3,
+    thickness: f32,
     members: &mut Vec<Member>,
     patches: &mut Vec<Patch>,
-    of_point: &mut [MaybeUninit<u8>],
+    of_point: &mut [MaybeUninit<Membership>],
 ) {
     members.clear();
-    for (i, point) in points.iter().enumerate() {
-        let normal = normals[point.point as usize];
+    for (i, (point, &normal)) in points.iter().zip(normals).enumerate() {
         if normal == Vec3::ZERO {
-            of_point[i].write(NONE);
+            of_point[i].write(Membership::NONE);
         } else {
             members.push((point.local - centre, normal, i as u32));
         }
     }
     // By place, so that the order of the input does not matter.
-    members
-        .sort_unstable_by(|(a, ..), (b, ..)| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
+    sort(members);
     let first = patches.len();
     for &(place, normal, i) in &*members {
         let own = &patches[first..];
-        let fits = own.iter().enumerate().filter_map(|(i, patch)| Some((i, misfit(patch, place, normal)?)));
+        let fits = own.iter().enumerate().filter_map(|(i, patch)| Some((i, misfit(patch, place, normal, thickness)?)));
         let mut best = fits.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(i, _)| i);
         if best.is_none() && own.len() == MOST {
             let distance = |patch: &Patch| (patch.centre / patch.points as f32).distance_squared(place);
@@ -123,10 +189,11 @@ fn split(
         }
         // Sums until all are in.
         let patch = &mut patches[first + number];
+        let is_opposite = patch.normal.dot(normal) < 0.0;
         patch.centre += place;
-        patch.normal += if patch.normal.dot(normal) < 0.0 { -normal } else { normal };
+        patch.normal += if is_opposite { -normal } else { normal };
         patch.points += 1;
-        of_point[i as usize].write(number as u8);
+        of_point[i as usize].write(Membership(number as u8 | if is_opposite { Membership::OPPOSITE } else { 0 }));
     }
     for patch in &mut patches[first..] {
         patch.centre /= patch.points as f32;
@@ -136,7 +203,7 @@ fn split(
 
 /// How badly a point fits a patch of sums; `None` if it is none of its.
 #[inline(always)]
-fn misfit(patch: &Patch, place: Vec3, normal: Vec3) -> Option<f32> {
+fn misfit(patch: &Patch, place: Vec3, normal: Vec3, thickness: f32) -> Option<f32> {
     let (square, along) = (patch.normal.length_squared(), patch.normal.dot(normal).abs());
     if along * along < COSINE_SQUARED * square {
         return None;
@@ -144,5 +211,5 @@ fn misfit(patch: &Patch, place: Vec3, normal: Vec3) -> Option<f32> {
     let apart = place - patch.centre / patch.points as f32;
     let length = square.sqrt();
     let off = (apart.dot(patch.normal).abs() / length).min(apart.dot(normal).abs());
-    (off < THICKNESS).then(|| 1.0 - along / length + off)
+    (off < thickness).then(|| 1.0 - along / length + off)
 }
