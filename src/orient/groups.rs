@@ -218,12 +218,18 @@ fn mend(links: &Links, own: &[f32], trust: f32, flipped: &mut [bool]) {
     const ROUNDS: usize = 16;
     /// Less is rounding.
     const LEAST: f32 = 1e-6;
+    // Whose neighbours changed since it was asked.
+    let mut is_stirred = vec![true; flipped.len()];
     for _ in 0..ROUNDS {
         let mut any = false;
         for one in 0..flipped.len() {
+            if !std::mem::take(&mut is_stirred[one]) {
+                continue;
+            }
             if support(links, flipped, one) + signed(flipped[one], trust * own[one]) < -LEAST {
                 flipped[one] = !flipped[one];
                 any = true;
+                links.from(one).iter().for_each(|link| is_stirred[link.to as usize] = true);
             }
         }
         if !any {

@@ -38,6 +38,10 @@ impl Membership {
     const NONE: Self = Self(u8::MAX);
     const OPPOSITE: u8 = 0x80;
 
+    fn new(patch: usize, is_opposite: bool) -> Self {
+        Self(patch as u8 | if is_opposite { Self::OPPOSITE } else { 0 })
+    }
+
     /// The number of the patch among those of the cube, and whether the point's normal is opposite to that of the patch.
     #[inline(always)]
     pub fn patch(self) -> Option<(usize, bool)> {
@@ -64,7 +68,7 @@ impl Patches {
         let counts = Filling::<u32>::new(grid.cubes(), "the patches")?;
         let found = Gathering::new("the patches");
         stage.run(grid.blocks.len(), &|block| {
-            let (mut patches, mut members) = (Vec::new(), Vec::new());
+            let (mut patches, mut order) = (Vec::new(), Vec::new());
             let bricks = grid.blocks[block].clone();
             let start = grid.first_point[bricks.start] as usize;
             let end = grid.first_point[bricks.end] as usize;
@@ -81,7 +85,7 @@ impl Patches {
                     normals = others;
                     let (memberships, others) = of_point.split_at_mut(points.len());
                     of_point = others;
-                    split(points, own, cube_centre(bit), thickness, &mut members, &mut patches, memberships);
+                    split(points, own, cube_centre(bit), thickness, &mut order, &mut patches, memberships);
                     // SAFETY: as above.
                     unsafe { counts.write(cube, (patches.len() - before) as u32) };
                 }
@@ -133,49 +137,34 @@ pub(super) fn noise(grid: &Grid, normals: &[Vec3]) -> f32 {
     if deviations.is_empty() { 0.0 } else { *deviations.select_nth_unstable_by(middle, f32::total_cmp).1 }
 }
 
-/// Sorts by place. Most cubes have few members, and for these nothing is faster.
-fn sort(members: &mut [Member]) {
-    const FEW: usize = 32;
-    let order =
-        |(a, ..): &Member, (b, ..): &Member| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z));
-    if members.len() > FEW {
-        members.sort_unstable_by(order);
-        return;
-    }
-    for end in 1..members.len() {
-        let mut i = end;
-        while i > 0 && order(&members[i], &members[i - 1]).is_lt() {
-            members.swap(i, i - 1);
-            i -= 1;
-        }
-    }
-}
-
-/// A point of a cube: its place against the cube's centre, its normal, and its number among the points of the cube.
-type Member = (Vec3, Vec3, u32);
-
 /// Parts the points of one cube; `normals` are theirs.
 fn split(
     points: &[Placed],
     normals: &[Vec3],
     centre: Vec3,
     thickness: f32,
-    members: &mut Vec<Member>,
+    order: &mut Vec<(u64, u32)>,
     patches: &mut Vec<Patch>,
     of_point: &mut [MaybeUninit<Membership>],
 ) {
-    members.clear();
-    for (i, (point, &normal)) in points.iter().zip(normals).enumerate() {
-        if normal == Vec3::ZERO {
-            of_point[i].write(Membership::NONE);
-        } else {
-            members.push((point.local - centre, normal, i as u32));
+    let first = patches.len();
+    if let Some(patch) = whole(points, normals, centre, thickness) {
+        patches.push(patch);
+        for (membership, &normal) in of_point.iter_mut().zip(normals) {
+            membership.write(Membership::new(0, patch.normal.dot(normal) < 0.0));
         }
+        return;
     }
     // By place, so that the order of the input does not matter.
-    sort(members);
-    let first = patches.len();
-    for &(place, normal, i) in &*members {
+    order.clear();
+    order.extend(points.iter().enumerate().map(|(i, point)| (key(point.local), i as u32)));
+    sort(order);
+    for &(_, i) in &*order {
+        let (place, normal) = (points[i as usize].local - centre, normals[i as usize]);
+        if normal == Vec3::ZERO {
+            of_point[i as usize].write(Membership::NONE);
+            continue;
+        }
         let own = &patches[first..];
         let fits = own.iter().enumerate().filter_map(|(i, patch)| Some((i, misfit(patch, place, normal, thickness)?)));
         let mut best = fits.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(i, _)| i);
@@ -193,11 +182,51 @@ fn split(
         patch.centre += place;
         patch.normal += if is_opposite { -normal } else { normal };
         patch.points += 1;
-        of_point[i as usize].write(Membership(number as u8 | if is_opposite { Membership::OPPOSITE } else { 0 }));
+        of_point[i as usize].write(Membership::new(number, is_opposite));
     }
     for patch in &mut patches[first..] {
         patch.centre /= patch.points as f32;
         patch.normal = patch.normal.normalize_or(Vec3::Z);
+    }
+}
+
+/// All points of a cube as one patch, if they lie on one: so most do, and need not be sorted.
+fn whole(points: &[Placed], normals: &[Vec3], centre: Vec3, thickness: f32) -> Option<Patch> {
+    let (mut place, mut normal) = (Vec3::ZERO, Vec3::ZERO);
+    for (point, &own) in points.iter().zip(normals) {
+        place += point.local;
+        normal += if normal.dot(own) < 0.0 { -own } else { own };
+    }
+    let (place, normal) = (place / points.len() as f32, normal.try_normalize()?);
+    let fits = |(point, own): (&Placed, &Vec3)| {
+        let along = normal.dot(*own);
+        along * along >= COSINE_SQUARED && (point.local - place).dot(normal).abs() < thickness
+    };
+    let patch = Patch { centre: place - centre, normal, points: points.len() as u32 };
+    points.iter().zip(normals).all(fits).then_some(patch)
+}
+
+/// Orders places in a brick by x, then y, then z. Numbers that are not negative have their bits in their order.
+fn key(place: Vec3) -> u64 {
+    let [x, y, z] = place.to_array().map(|coordinate| u64::from(coordinate.to_bits() >> 10));
+    x << 42 | y << 21 | z
+}
+
+/// Sorts by key. Most cubes have few points, and for these nothing is faster.
+fn sort(order: &mut [(u64, u32)]) {
+    const FEW: usize = 32;
+    if order.len() > FEW {
+        order.sort_unstable();
+        return;
+    }
+    for end in 1..order.len() {
+        let one = order[end];
+        let mut place = end;
+        while place > 0 && one < order[place - 1] {
+            order[place] = order[place - 1];
+            place -= 1;
+        }
+        order[place] = one;
     }
 }
 
