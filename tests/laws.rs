@@ -185,6 +185,10 @@ fn the_same_bits_for_any_number_of_threads() {
         (with_spoilt(300_000), cells(&[Cell::Auto, Cell::Scale(1.0), Cell::Size(0.05)])),
         (cube(200_000, 20).noisy(0.003, 21).points, cells(&[Cell::Auto])),
         (with_spoilt(100_000), baselines(&[None])),
+        (
+            cube(200_000, 22).noisy(0.006, 23).points,
+            vec![Options { orient: Orient::Consistent, cell: Cell::Scale(1.0), ..Options::default() }],
+        ),
     ] {
         let strayed = [points.clone(), vec![1e9, 1e9, 1e9]].concat();
         for (points, options) in [&points, &strayed].into_iter().flat_map(|p| options.iter().map(move |o| (p, o))) {

@@ -293,7 +293,8 @@ function surfaces(components: Report['components'] = []): [string, string][] {
     const sure = `${Math.round(100 * confidence)} % sure`;
     return `${points.toLocaleString('en')} points ${side === 'air' ? 'outwards' : 'away from the middle'}, ${sure}`;
   });
-  if (components.length > shown.length) shown.push(`${(components.length - shown.length).toLocaleString('en')} smaller`);
+  if (components.length > shown.length)
+    shown.push(`${(components.length - shown.length).toLocaleString('en')} smaller`);
   return shown.map((text, i) => [i === 0 ? 'surfaces' : '', text]);
 }
 

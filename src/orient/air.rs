@@ -32,7 +32,7 @@ pub(super) fn exposure(grid: &Grid, patches: &Patches, points: usize, stage: &St
         let mut seen = seen.iter();
         for (&place, &mask) in grid.bricks.places.iter().zip(&grid.masks) {
             for (bit, seen) in set_bits(mask).zip(&mut seen) {
-                if open.holds(voxels.of_cube(place, bit)) {
+                if voxels.of_cube(place, bit).is_some_and(|voxel| open.holds(voxel)) {
                     seen.fetch_or(1 << number, Relaxed);
                 }
             }
@@ -73,23 +73,19 @@ struct Bits {
 
 impl Voxels {
     fn of(grid: &Grid, points: usize) -> Result<Self, Error> {
-        let (low, high) = grid
-            .bricks
-            .places
-            .iter()
-            .fold((IVec3::MAX, IVec3::MIN), |(low, high), &place| (low.min(place), high.max(place)));
-        let first = 4 * low;
-        let cubes = if grid.bricks.places.is_empty() { IVec3::ZERO } else { 4 * (high + 1) - first };
         // Two bits a point, and no less than is done at once.
         let most = (16.0 * points as f64).max(4e6);
-        let mut doublings = 0;
-        let size = loop {
-            let size: IVec3 = (cubes + ((1 << doublings) - 1)) >> doublings;
-            if f64::from((size.x + 63) & !63) * f64::from(size.y) * f64::from(size.z) <= most {
-                break size;
-            }
+        let volume = |size: IVec3| f64::from((size.x + 63) & !63) * f64::from(size.y) * f64::from(size.z);
+        let (mut first, mut size) = box_round(&grid.bricks.places, 0.0);
+        if volume(size) > most {
+            // Without what strays; that is not asked, and hides nothing.
+            (first, size) = box_round(&grid.bricks.places, STRAY);
+        }
+        let (cubes, mut doublings) = (size, 0);
+        while volume(size) > most {
             doublings += 1;
-        };
+            size = (cubes + ((1 << doublings) - 1)) >> doublings;
+        }
         let width = (size.x as usize).div_ceil(64);
         let mut words = Vec::new();
         let length = width * size.y as usize * size.z as usize;
@@ -98,17 +94,23 @@ impl Voxels {
         let mut voxels = Self { first, doublings, bits: Bits { size, width, words } };
         for (&place, &mask) in grid.bricks.places.iter().zip(&grid.masks) {
             for bit in set_bits(mask) {
-                let (word, bit) = voxels.bits.place(voxels.of_cube(place, bit));
-                voxels.bits.words[word] |= bit;
+                if let Some(voxel) = voxels.of_cube(place, bit) {
+                    let (word, bit) = voxels.bits.place(voxel);
+                    voxels.bits.words[word] |= bit;
+                }
             }
         }
         Ok(voxels)
     }
 
+    /// The voxel of a cube, unless that strays.
     #[inline(always)]
-    fn of_cube(&self, brick: IVec3, bit: u32) -> IVec3 {
+    fn of_cube(&self, brick: IVec3, bit: u32) -> Option<IVec3> {
         let bit = bit as i32;
-        (4 * brick + IVec3::new(bit & 3, bit >> 2 & 3, bit >> 4) - self.first) >> self.doublings
+        let cube = 4 * brick + IVec3::new(bit & 3, bit >> 2 & 3, bit >> 4) - self.first;
+        let voxel = cube >> self.doublings;
+        // Below the first are large numbers.
+        voxel.as_uvec3().cmplt(self.bits.size.as_uvec3()).all().then_some(voxel)
     }
 
     /// The voxels beyond which none is occupied along a direction.
@@ -161,6 +163,25 @@ impl Voxels {
         open
     }
 }
+
+/// The first cube, and the size in cubes, of a box round all bricks but a share at each end of each axis.
+fn box_round(bricks: &[IVec3], share: f64) -> (IVec3, IVec3) {
+    if bricks.is_empty() {
+        return (IVec3::ZERO, IVec3::ZERO);
+    }
+    let [low, high] = [share, 1.0 - share].map(|quantile| {
+        let rank = ((bricks.len() - 1) as f64 * quantile).round() as usize;
+        let along = |axis: usize| {
+            let mut places: Vec<i32> = bricks.iter().map(|brick| brick[axis]).collect();
+            *places.select_nth_unstable(rank).1
+        };
+        IVec3::new(along(0), along(1), along(2))
+    });
+    (4 * low, 4 * (high - low + 1))
+}
+
+/// The share of bricks at each end of an axis that may stray.
+const STRAY: f64 = 0.005;
 
 impl Bits {
     fn row(&self, y: i32, z: i32) -> std::ops::Range<usize> {

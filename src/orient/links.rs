@@ -25,12 +25,20 @@ pub(super) struct Links {
     pub all: Vec<Link>,
 }
 
+/// The evidence of two patches that face each other.
+const FACING: f32 = 0.3;
+
+/// How many times the noise they are apart at least.
+const DEVIATIONS: f32 = 10.0;
+
 /// Less is no evidence, and costs memory.
 const LEAST: f32 = 0.01;
 
 impl Links {
-    /// Links every patch to those in its cube and the 26 round it. One pass over the patches.
-    pub fn of(grid: &Grid, patches: &Patches, stage: &Stage) -> Result<Self, Error> {
+    /// Links every patch to those in its cube and the 26 round it; `noise` is that of the points, in edges. One pass over the
+    /// patches.
+    pub fn of(grid: &Grid, patches: &Patches, noise: f32, stage: &Stage) -> Result<Self, Error> {
+        let apart = DEVIATIONS * noise;
         let found = Gathering::new("the graph of patches");
         stage.run(grid.blocks.len(), &|block| {
             let mut surroundings = Surroundings::new();
@@ -44,7 +52,7 @@ impl Links {
                             let cube = surroundings.cube(Places::of_near(bit, near));
                             let step = NEAR[near as usize % 64].xyz();
                             for to in patches.first[cube]..patches.first[cube + 1] {
-                                let evidence = evidence(patch, &patches.all[to as usize], step);
+                                let evidence = evidence(patch, &patches.all[to as usize], step, apart);
                                 if to != own && evidence.abs() > LEAST {
                                     links.push(Link { to, evidence });
                                 }
@@ -91,18 +99,23 @@ impl Links {
 /// of a circle are each other's picture, also at a right-angled crease and on the two sides of a thin plate, where the
 /// normals alone say nothing, or the opposite (after Xie, McDonnell and Qin, "Surface reconstruction of noisy and defective
 /// data sets", 2004). What counts less: a line along the normals, and one that meets them at different angles, as on no arc.
+///
+/// Along the normals two patches may be noise of one surface; if they are further apart than that, `apart` in edges, they are
+/// two sides of a wall or of a gap, and face away from each other or towards each other.
 #[inline(always)]
-fn evidence(a: &Patch, b: &Patch, step: Vec3) -> f32 {
-    let apart = step + b.centre - a.centre;
-    let square = apart.length_squared();
+fn evidence(a: &Patch, b: &Patch, step: Vec3, apart: f32) -> f32 {
+    let line = step + b.centre - a.centre;
+    let square = line.length_squared();
     let dot = a.normal.dot(b.normal);
     if square < 4e-4 {
         return dot * dot * dot;
     }
-    let scale = 1.0 / square.sqrt();
-    let (x, y) = (apart.dot(a.normal) * scale, apart.dot(b.normal) * scale);
+    let length = square.sqrt();
+    let (x, y) = (line.dot(a.normal) / length, line.dot(b.normal) / length);
     let reflected = dot - 2.0 * (x * y);
-    let (x, y) = (x.abs(), y.abs());
-    let weight = reflected * (1.0 - (x + y) / 2.0) * (1.0 - (x - y).abs());
-    weight * weight * weight
+    let (facing, skew) = ((x * y).abs(), (x.abs() - y.abs()).abs());
+    let arc = (1.0 - facing) * (1.0 - skew);
+    let is_wall = length * facing > apart;
+    reflected.signum() * reflected.powi(6) * arc.powi(3)
+        + if is_wall { FACING * reflected * facing.powi(8) } else { 0.0 }
 }

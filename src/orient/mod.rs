@@ -118,7 +118,7 @@ fn surfaces(
     let (grid, noise) = sort(points, normals, bounds, &stage.part(0.0..0.35))?;
     let patches = Patches::of(&grid, normals, noise, &stage.part(0.35..0.5))?;
     let exposure = air::exposure(&grid, &patches, points.len(), &stage.part(0.5..0.55))?;
-    let links = Links::of(&grid, &patches, &stage.part(0.55..0.7))?;
+    let links = Links::of(&grid, &patches, noise, &stage.part(0.55..0.7))?;
     let evidence = exposure.iter().map(|exposure| trust * exposure).collect();
     let mut signs = groups::signs(links, evidence, &stage.part(0.7..0.95))?;
     let components = decide(&grid, &patches, &exposure, &mut signs);

@@ -1,0 +1,237 @@
+//! Signs: outwards on closed surfaces, one for each open one, towards what was asked for.
+#![cfg(not(target_arch = "wasm32"))]
+
+mod common;
+
+use bilinormal::{Cell, Component, Error, Estimate, Method, Options, Orient, Points, Progress, Side, estimate};
+use common::*;
+use std::f64::consts::TAU;
+
+fn orient(points: &[f32], orient: Orient) -> Estimate {
+    run_with(&Points::from_f32(points).unwrap(), &Options { orient, ..Options::default() })
+}
+
+fn components(estimate: &Estimate) -> &[Component] {
+    estimate.report.components.as_deref().unwrap()
+}
+
+/// Normals on the same side as the truth, of those that are not across it: where an edge has a normal of its own, the line
+/// of which is wrong, a sign means nothing.
+fn share_right(normals: &[f32], truth: &[[f64; 3]]) -> f64 {
+    let dots = normals.chunks_exact(3).zip(truth).map(|(n, t)| (0..3).map(|i| f64::from(n[i]) * t[i]).sum::<f64>());
+    let told: Vec<f64> = dots.filter(|dot| dot.abs() > 0.5).collect();
+    told.iter().filter(|dot| **dot > 0.0).count() as f64 / told.len() as f64
+}
+
+fn moved(cloud: Cloud, by: [f64; 3], scale: f64) -> Cloud {
+    let Cloud { points, normals } = cloud;
+    let points =
+        points.chunks_exact(3).flat_map(|p| [0, 1, 2].map(|i| (f64::from(p[i]) * scale + by[i]) as f32)).collect();
+    Cloud { points, normals }
+}
+
+fn joined(clouds: impl IntoIterator<Item = Cloud>) -> Cloud {
+    let (points, normals): (Vec<_>, Vec<_>) = clouds.into_iter().map(|cloud| (cloud.points, cloud.normals)).unzip();
+    Cloud { points: points.concat(), normals: normals.concat() }
+}
+
+/// A closed box of 2 x 2 x `height`.
+fn plate(count: usize, seed: u64, height: f64) -> Cloud {
+    let mut random = Random(seed);
+    Cloud::of((0..count).map(|_| {
+        let (x, y, z) = (random.signed(), random.signed(), random.signed());
+        let side = if random.unit() < 0.5 { 1.0 } else { -1.0 };
+        let rim = height / (1.0 + height);
+        let (point, normal) = match random.unit() {
+            share if share < rim / 2.0 => ([side, y, z * height / 2.0], [side, 0.0, 0.0]),
+            share if share < rim => ([x, side, z * height / 2.0], [0.0, side, 0.0]),
+            _ => ([x, y, side * height / 2.0], [0.0, 0.0, side]),
+        };
+        (turn(point), turn(normal))
+    }))
+}
+
+/// A band of half a twist, radius 1, width 0.6. It has one side.
+fn moebius(count: usize, seed: u64) -> Vec<f32> {
+    let mut random = Random(seed);
+    let point = |angle: f64, across: f64| {
+        let radius = 1.0 + across * (angle / 2.0).cos();
+        [radius * angle.cos(), radius * angle.sin(), across * (angle / 2.0).sin()].map(|c| c as f32)
+    };
+    (0..count).flat_map(|_| point(TAU * random.unit(), 0.3 * random.signed())).collect()
+}
+
+#[test]
+fn closed_surfaces_face_outwards_whatever_the_method() {
+    for (name, cloud) in [
+        ("sphere", sphere(50_000, 1)),
+        ("torus", torus(50_000, 2)),
+        ("cube", cube(50_000, 3)),
+        ("plate", plate(50_000, 4, 0.1)),
+        ("thin plate", plate(50_000, 4, 0.04)),
+        ("two spheres", joined([sphere(30_000, 5), moved(sphere(30_000, 6), [2.5, 0.0, 0.0], 1.0)])),
+        ("nested spheres", joined([sphere(40_000, 7), moved(sphere(20_000, 8), [0.0; 3], 0.7)])),
+        ("touching spheres", joined([sphere(30_000, 9), moved(sphere(30_000, 10), [2.0, 0.0, 0.0], 1.0)])),
+    ] {
+        for options in [
+            Options::default(),
+            Options { cell: Cell::Scale(1.0), ..Options::default() },
+            Options { method: Method::Knn, ..Options::default() },
+        ] {
+            for orient in [Orient::Consistent, Orient::Outward] {
+                let result =
+                    run_with(&Points::from_f32(&cloud.points).unwrap(), &Options { orient, ..options.clone() });
+                let right = share_right(&result.normals, &cloud.normals);
+                // At the point that two spheres share a few points belong to either; the rim of the thin plate is
+                // narrower than a cube.
+                let least = match name {
+                    "touching spheres" => 0.99,
+                    "thin plate" => 0.999,
+                    _ => 1.0,
+                };
+                assert!(right >= least, "{name}, {orient:?}, {:?}: {right}", options.method);
+                let components = components(&result);
+                assert_eq!(components.iter().map(|one| one.points).sum::<u64>(), cloud.normals.len() as u64, "{name}");
+                assert!(components[0].side == Side::Air && components[0].confidence > 0.9, "{name}: {components:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn noise_flips_next_to_nothing() {
+    for (name, cloud, least) in [
+        ("sphere", sphere(100_000, 11).noisy(0.006, 1), 0.9995),
+        ("torus", torus(100_000, 12).noisy(0.006, 2), 0.9995),
+        ("cube", cube(100_000, 13).noisy(0.012, 3), 0.998),
+        // Four deviations thick.
+        ("plate", plate(100_000, 14, 0.04).noisy(0.0035, 4), 0.99),
+    ] {
+        let right = share_right(&orient(&cloud.points, Orient::Consistent).normals, &cloud.normals);
+        assert!(right >= least, "{name}: {right}");
+    }
+}
+
+/// Nothing tells its outside, so the sign of the whole is a convention; that it is one is not, also under noise that is
+/// thicker than the cubes.
+#[test]
+fn an_open_surface_has_one_sign() {
+    for (noise, least) in [(0.0, 1.0), (0.006, 0.998), (0.012, 0.995)] {
+        let cloud = terrain(100_000, 15).noisy(noise, 5);
+        let result = orient(&cloud.points, Orient::Consistent);
+        let right = share_right(&result.normals, &cloud.normals);
+        assert!(right.max(1.0 - right) >= least, "noise {noise}: {right}");
+        let largest = components(&result)[0];
+        assert!(largest.side == Side::Volume && largest.confidence < 0.2, "noise {noise}: {largest:?}");
+    }
+}
+
+#[test]
+fn a_surface_with_one_side_is_not_called_right() {
+    let result = orient(&moebius(100_000, 16), Orient::Consistent);
+    assert!(components(&result)[0].confidence < 0.5, "{:?}", components(&result));
+}
+
+#[test]
+fn towards_a_viewpoint_in_the_coordinates_of_the_input() {
+    let place = [4.5e6, 5.2e6, 300.0];
+    let cloud = terrain(30_000, 17);
+    let points: Vec<f64> =
+        cloud.points.chunks_exact(3).flat_map(|p| [0, 1, 2].map(|i| f64::from(p[i]) + place[i])).collect();
+    for (height, sign) in [(50.0, 1.0), (-50.0, -1.0)] {
+        let viewpoint = [place[0], place[1], place[2] + height];
+        let options = Options { orient: Orient::Viewpoint(viewpoint), ..Options::default() };
+        let result = run_with(&Points::from_f64(&points).unwrap(), &options);
+        let truth: Vec<[f64; 3]> = cloud.normals.iter().map(|n| n.map(|c| sign * c)).collect();
+        assert_eq!(share_right(&result.normals, &truth), 1.0, "{height}");
+        assert_eq!(result.report.components, None);
+    }
+}
+
+#[test]
+fn towards_a_direction_of_any_length() {
+    let cloud = torus(30_000, 18);
+    for up in [[0.0, 0.0, 1e-300], [0.0, 3e300, 0.0], [-1.0, 2.0, 0.5]] {
+        let result = orient(&cloud.points, Orient::Up(up));
+        for n in result.normals.chunks_exact(3) {
+            let dot: f64 = (0..3).map(|i| f64::from(n[i]) * up[i]).sum();
+            assert!(dot >= 0.0, "{n:?} against {up:?}");
+        }
+    }
+}
+
+/// The mirror image has the mirrored signs, and the order of the points means nothing.
+#[test]
+fn mirrors_and_permutations_change_only_what_they_must() {
+    let cloud = joined([torus(40_000, 19), moved(plate(40_000, 20, 0.1), [3.0, 0.0, 0.0], 1.0)]).noisy(0.001, 6);
+    let signs = |points: &[f32], truth: &[[f64; 3]]| share_right(&orient(points, Orient::Consistent).normals, truth);
+    assert_eq!(signs(&cloud.points, &cloud.normals), 1.0);
+    let mirrored: Vec<f32> = cloud.points.chunks_exact(3).flat_map(|p| [-p[0], p[1], p[2]]).collect();
+    let truth: Vec<[f64; 3]> = cloud.normals.iter().map(|n| [-n[0], n[1], n[2]]).collect();
+    assert_eq!(signs(&mirrored, &truth), 1.0);
+    let reversed: Vec<f32> = cloud.points.chunks_exact(3).rev().flatten().copied().collect();
+    let truth: Vec<[f64; 3]> = cloud.normals.iter().rev().copied().collect();
+    assert_eq!(signs(&reversed, &truth), 1.0);
+}
+
+#[test]
+fn a_stray_point_turns_nothing() {
+    let cloud = torus(50_000, 21);
+    for stray in [1e4, 1e9] {
+        let points = [&cloud.points[..], &[stray, -stray, stray]].concat();
+        let result = orient(&points, Orient::Consistent);
+        assert_eq!(share_right(&result.normals[..150_000], &cloud.normals), 1.0, "{stray}");
+    }
+}
+
+#[test]
+fn only_signs_change() {
+    let cloud = cube(30_000, 22).noisy(0.006, 7);
+    let plain = orient(&cloud.points, Orient::None);
+    assert_eq!(plain.report.components, None);
+    for how in [Orient::Consistent, Orient::Outward, Orient::Up([1.0, 0.0, 0.0]), Orient::Viewpoint([9.0, 0.0, 0.0])] {
+        let oriented = orient(&cloud.points, how);
+        assert_eq!(oriented.report.points, plain.report.points);
+        for (a, b) in oriented.normals.chunks_exact(3).zip(plain.normals.chunks_exact(3)) {
+            let is_flipped = (0..3).all(|i| a[i] == -b[i]);
+            assert!(a == b || is_flipped, "{how:?}: {a:?} of {b:?}");
+            assert!(a.iter().all(|c| !(*c == 0.0 && c.is_sign_negative())), "{how:?}: {a:?}");
+        }
+    }
+}
+
+#[test]
+fn clouds_without_a_surface_have_no_components() {
+    for points in [vec![], vec![f32::NAN; 30], vec![1.0; 30]] {
+        let result = orient(&points, Orient::Consistent);
+        assert_eq!(result.normals, vec![0.0; points.len()]);
+        assert_eq!(components(&result), []);
+    }
+}
+
+#[test]
+fn it_can_be_stopped_anywhere() {
+    use std::cell::Cell as Counter;
+    use std::ops::ControlFlow;
+    // So noisy that the cubes are enlarged.
+    let cloud = terrain(60_000, 23).noisy(0.02, 8);
+    let points = Points::from_f32(&cloud.points).unwrap();
+    let options = Options { orient: Orient::Consistent, ..Options::default() };
+    let (calls, last) = (Counter::new(0), Counter::new(0.0));
+    let observer = |_: &'static str, fraction: f64| {
+        assert!(fraction >= last.get(), "{fraction} after {}", last.get());
+        last.set(fraction);
+        calls.set(calls.get() + 1);
+        ControlFlow::Continue(())
+    };
+    estimate(&points, &options, &Progress::new(&observer, &|| 0.0)).unwrap();
+    assert_eq!(last.get(), 1.0);
+    for stop in 0..calls.get() {
+        let heard = Counter::new(0);
+        let observer = |_: &'static str, _: f64| {
+            heard.set(heard.get() + 1);
+            if heard.get() > stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        assert_eq!(estimate(&points, &options, &Progress::new(&observer, &|| 0.0)), Err(Error::Cancelled));
+    }
+}
