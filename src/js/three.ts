@@ -20,6 +20,11 @@ export interface PointMaterialOptions {
   round?: boolean;
   /** Brightness, 0 to 1, of a surface seen edge on. Default 0.15. */
   ambient?: number;
+  /**
+   * Of points whose normals point away from the camera: with any shading they are lit in this colour. Default `null`:
+   * both sides look the same.
+   */
+  backColor?: ColorRepresentation | null;
 }
 
 const shadings: readonly Shading[] = ['shaded', 'normals', 'colors', 'plain'];
@@ -53,6 +58,8 @@ void main() {
 const fragmentShader = /* glsl */ `
 uniform int shading;
 uniform vec3 base;
+uniform vec3 back;
+uniform bool hasBack;
 uniform float ambient;
 uniform bool isRound;
 varying vec3 vNormal;
@@ -72,11 +79,14 @@ void main() {
   #include <logdepthbuf_fragment>
   vec2 offset = gl_PointCoord - 0.5;
   if (isRound && dot(offset, offset) > 0.25) discard;
+  // A point without a normal is neither lit nor dark, and has no back.
+  float facing = vNormal == vec3(0.0) ? 0.5 : dot(normalize(vNormal), normalize(vToCamera));
+  float light = mix(ambient, 1.0, abs(facing));
   vec3 shown = base;
-  if (shading == 0) {
-    // A point without a normal is neither lit nor dark.
-    float facing = vNormal == vec3(0.0) ? 0.5 : abs(dot(normalize(vNormal), normalize(vToCamera)));
-    shown *= mix(ambient, 1.0, facing);
+  if (hasBack && facing < 0.0) {
+    shown = back * light;
+  } else if (shading == 0) {
+    shown *= light;
   } else if (shading == 1) {
     shown = linear(0.5 + 0.5 * vNormal);
   } else if (shading == 2) {
@@ -103,6 +113,8 @@ export class PointMaterial extends ShaderMaterial {
       uniforms: {
         shading: { value: 0 },
         base: { value: new Color(color) },
+        back: { value: new Color() },
+        hasBack: { value: false },
         ambient: { value: ambient },
         size: { value: size },
         pixels: { value: pixels },
@@ -112,6 +124,7 @@ export class PointMaterial extends ShaderMaterial {
       },
     });
     this.shading = shading;
+    this.backColor = options.backColor ?? null;
   }
 
   get shading(): Shading {
@@ -128,6 +141,14 @@ export class PointMaterial extends ShaderMaterial {
   }
   set color(color: ColorRepresentation) {
     this.uniforms.base!.value.set(color);
+  }
+
+  get backColor(): Color | null {
+    return this.uniforms.hasBack!.value ? this.uniforms.back!.value : null;
+  }
+  set backColor(color: ColorRepresentation | null) {
+    this.uniforms.hasBack!.value = color !== null;
+    if (color !== null) this.uniforms.back!.value.set(color);
   }
 
   get size(): number {
