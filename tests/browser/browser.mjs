@@ -60,8 +60,8 @@ export async function openBrowser() {
   };
 }
 
-/** A binary PLY of the unit sphere, evenly covered in a random order; `colored` adds red, green, blue. */
-export function spherePly(points, { colored = false } = {}) {
+/** A binary PLY of a unit sphere, evenly covered in a random order; `colored` adds red, green, blue. */
+export function spherePly(points, { colored = false, centre = [0, 0, 0] } = {}) {
   const colors = colored ? 'property uchar red\nproperty uchar green\nproperty uchar blue\n' : '';
   const header = Buffer.from(
     `ply\nformat binary_little_endian 1.0\nelement vertex ${points}\n` +
@@ -76,9 +76,9 @@ export function spherePly(points, { colored = false } = {}) {
     const z = 2 * random() - 1;
     const turn = 2 * Math.PI * random();
     const ring = Math.sqrt(1 - z * z);
-    file.writeFloatLE(ring * Math.cos(turn), at);
-    file.writeFloatLE(ring * Math.sin(turn), at + 4);
-    file.writeFloatLE(z, at + 8);
+    file.writeFloatLE(centre[0] + ring * Math.cos(turn), at);
+    file.writeFloatLE(centre[1] + ring * Math.sin(turn), at + 4);
+    file.writeFloatLE(centre[2] + z, at + 8);
     if (colored) file.set([255 * (i % 2), 96, 160], at + 12);
   }
   return file;
@@ -139,21 +139,35 @@ export async function save(page) {
 }
 
 /** Once nothing is left to draw: the distinct colours, in steps of 8, in a square in the middle of a view. */
-export async function colorsShown(page, { x = 498, y = 400, side = 200 } = {}) {
+export async function colorsShown(page, square) {
+  return (await colorsIn(page, square)).length;
+}
+
+/** The share, 0 to 1, of a square that has the colour of back faces, which is lit. */
+export async function backsShown(page, square) {
+  const colors = await colorsIn(page, square);
+  const sum = (some) => some.reduce((sum, { pixels }) => sum + pixels, 0);
+  return sum(colors.filter(({ red, green, blue }) => red > 2 * green && blue > green && red > blue)) / sum(colors);
+}
+
+async function colorsIn(page, { x = 498, y = 400, side = 200 } = {}) {
   await page.waitForTimeout(600);
   const clip = { x: x - side / 2, y: y - side / 2, width: side, height: side };
   const shot = await page.screenshot({ clip });
-  const colors = await page.evaluate(async (text) => {
+  return page.evaluate(async (text) => {
     const image = new Image();
     image.src = `data:image/png;base64,${text}`;
     await image.decode();
     const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
     context.drawImage(image, 0, 0);
     const { data } = context.getImageData(0, 0, image.width, image.height);
-    const found = new Set();
-    for (let i = 0; i < data.length; i += 4)
-      found.add(((data[i] >> 3) << 10) | ((data[i + 1] >> 3) << 5) | (data[i + 2] >> 3));
-    return [...found];
+    const found = new Map();
+    for (let i = 0; i < data.length; i += 4) {
+      const [red, green, blue] = [data[i] & 0xf8, data[i + 1] & 0xf8, data[i + 2] & 0xf8];
+      const key = (red << 16) | (green << 8) | blue;
+      if (!found.has(key)) found.set(key, { red, green, blue, pixels: 0 });
+      found.get(key).pixels++;
+    }
+    return [...found.values()];
   }, shot.toString('base64'));
-  return colors.length;
 }

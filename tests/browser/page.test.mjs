@@ -7,7 +7,8 @@ import { join } from 'node:path';
 import { after, afterEach, before, test as nodeTest } from 'node:test';
 import { gunzipSync } from 'node:zlib';
 import { root } from '../../scripts/run.mjs';
-import { ARTEFACTS, choose, colorsShown, drop, openBrowser, result, save, spherePly } from './browser.mjs';
+import { parsePly } from '../node/ply.mjs';
+import { ARTEFACTS, backsShown, choose, colorsShown, drop, openBrowser, result, save, spherePly } from './browser.mjs';
 
 const SCANS = join(root, '..', 'shared', 'data', 'scans');
 let browser;
@@ -277,6 +278,137 @@ test('curvature is computed to be shown, for the normals that are there, and sav
   await again.click();
   await result(page, 'ball.ply');
   assert.equal(readSaved((await save(page)).bytes).length, 6 * 20_000);
+});
+
+const orientation = (name) => page.getByRole('group', { name: 'Orientation' }).getByRole('radio', { name });
+
+/** Computes again with an orientation; the points and normals that are saved then, and what the status line says. */
+async function oriented(name, file = 'ball.ply') {
+  await orientation(name).check();
+  await page.getByRole('button', { name: 'Re-run' }).click();
+  assert.equal((await result(page, file)).error, undefined);
+  return { facts: await page.locator('#facts').innerText(), saved: readSaved((await save(page)).bytes) };
+}
+
+/** The share of the points of a saved sphere whose normals go along what `side` says, given position and normal. */
+function shareOf(saved, side) {
+  let along = 0;
+  for (let i = 0; i < saved.length; i += 6) along += side(saved.subarray(i, i + 3), saved.subarray(i + 3, i + 6)) > 0;
+  return along / (saved.length / 6);
+}
+
+test('normals are saved with the signs of the orientation that was chosen', async () => {
+  page = await browser.openPage(browser.isolated);
+  const centre = [10, -4, 3];
+  const outwards = (position, normal) => normal.reduce((sum, n, axis) => sum + n * (position[axis] - centre[axis]), 0);
+  await drop(page, 'ball.ply', spherePly(20_000, { centre }));
+  await result(page, 'ball.ply');
+  assert.ok(await orientation('As found').isChecked());
+  const found = shareOf(readSaved((await save(page)).bytes), outwards);
+  assert.ok(found > 0.4 && found < 0.6, `${found} outwards as found`);
+  assert.doesNotMatch(await page.locator('#facts').innerText(), /surface|wards/);
+
+  for (const name of ['Consistent', 'Outward']) {
+    const { facts, saved } = await oriented(name);
+    assert.equal(shareOf(saved, outwards), 1, name);
+    assert.match(facts, /1 surface\s+100% in the largest\s+outwards with confidence (1\.00|0\.[89]\d)/);
+  }
+  // Across the axis the sign is free, and a normal of the sphere is off by a degree at the most.
+  const rising = (axis) => (_, normal) => normal[axis] + 0.001;
+  for (const [up, axis] of [
+    ['Y', 1],
+    ['Z', 2],
+  ]) {
+    await page.getByRole('radio', { name: up, exact: true }).check();
+    const { facts, saved } = await oriented('Up');
+    assert.equal(shareOf(saved, rising(axis)), 1, up);
+    assert.match(facts, /upwards/);
+    assert.doesNotMatch(facts, /surface/);
+  }
+});
+
+test('towards the camera no back faces show, wherever it is, and after a flip there is nothing else', async () => {
+  // A turn ends at once: the camera must stand still when it is asked where it is.
+  page = await browser.openPage(browser.isolated, { reducedMotion: 'reduce' });
+  // So that a camera in the coordinates of the view, which has its middle in the ball, would be on the other side.
+  await drop(page, 'ball.ply', spherePly(20_000, { centre: [-10, 4, -3] }));
+  await result(page, 'ball.ply');
+  await page.getByRole('radio', { name: 'Z', exact: true }).check();
+  await page.mouse.move(400, 400);
+  await page.mouse.down();
+  await page.mouse.move(640, 250, { steps: 3 });
+  await page.mouse.up();
+  await colorsShown(page);
+  await page.getByRole('checkbox', { name: 'Back faces' }).check();
+  const square = { side: 300 };
+  const found = await backsShown(page, square);
+  assert.ok(found > 0.1, `${found} of the view as found`);
+  const { facts } = await oriented('Camera');
+  assert.match(facts, /towards the camera/);
+  assert.equal(await backsShown(page, square), 0);
+  const flip = page.getByRole('button', { name: 'Flip all' });
+  await flip.click();
+  assert.match(await page.locator('#facts').innerText(), /away from the camera/);
+  const flipped = await backsShown(page, square);
+  assert.ok(flipped > 0.95, `${flipped} of the view after a flip`);
+
+  // The key does what the box does; without it both sides look the same.
+  await page.keyboard.press('b');
+  assert.ok(!(await page.getByRole('checkbox', { name: 'Back faces' }).isChecked()));
+  assert.equal(await backsShown(page, square), 0);
+});
+
+test('a flip turns what is saved, again undoes it, and curvature keeps it', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'ball.ply', spherePly(20_000));
+  await result(page, 'ball.ply');
+  const flip = page.getByRole('button', { name: 'Flip all' });
+  const { saved: before } = await oriented('Outward');
+  await flip.click();
+  assert.equal(await flip.getAttribute('aria-pressed'), 'true');
+  assert.match(await page.locator('#facts').innerText(), /inwards/);
+  const turned = before.map((value, i) => (i % 6 < 3 ? value : 0 - value));
+  assert.deepEqual(readSaved((await save(page)).bytes), turned);
+
+  // Shown with the signs that are on the screen, though it is all computed again.
+  await page.getByRole('radio', { name: 'Curvature' }).check();
+  await result(page, 'ball.ply');
+  const bent = readSaved((await save(page)).bytes, 'curvature').filter((_, i) => i % 7 < 6);
+  assert.deepEqual(bent, turned);
+  await page.getByRole('radio', { name: 'Shaded' }).check();
+
+  await flip.click();
+  assert.equal(await flip.getAttribute('aria-pressed'), 'false');
+  assert.deepEqual(
+    readSaved((await save(page)).bytes, 'curvature').filter((_, i) => i % 7 < 6),
+    before,
+  );
+
+  // What is computed anew is as its orientation promises.
+  await flip.click();
+  assert.deepEqual((await oriented('Outward')).saved, before);
+  assert.equal(await flip.getAttribute('aria-pressed'), 'false');
+});
+
+test('the sides of the plinth of the sample face outwards', async () => {
+  page = await browser.openPage(`${browser.isolated}?sample`);
+  await result(page, 'sample.ply');
+  await orientation('Outward').check();
+  await page.getByRole('button', { name: 'Re-run' }).click();
+  assert.equal((await result(page, 'sample.ply')).error, undefined);
+  await page.keyboard.press('b');
+  const backs = await backsShown(page, { y: 300, side: 100 });
+  assert.ok(backs < 0.02, `${backs} of the outside of the shell`);
+  await page.screenshot({ path: join(ARTEFACTS, 'sample-backs.png') });
+  const { properties } = parsePly((await save(page)).bytes).elements[0];
+  const [x, y, z, nx, nz] = ['x', 'y', 'z', 'nx', 'nz'].map((wanted) => properties.find(({ name }) => name === wanted));
+  let [all, outwards] = [0, 0];
+  for (let i = 0; i < x.values.length; i++) {
+    if (y.values[i] < 0.016 || y.values[i] > 0.04 || Math.hypot(x.values[i], z.values[i]) < 0.12) continue;
+    all++;
+    outwards += x.values[i] * nx.values[i] + z.values[i] * nz.values[i] > 0;
+  }
+  assert.ok(all > 20_000 && outwards > 0.999 * all, `${outwards} of ${all}`);
 });
 
 test('the baselines without threads', async () => {

@@ -2,7 +2,7 @@
 import { drawHero } from './hero';
 import { element, showState } from './panel';
 import { createSession, type Session } from './session';
-import { METHODS, type CellKind, type Method } from './options';
+import { METHODS, type CellKind, type Method, type OrientKind } from './options';
 import { createStore, type Store } from './state';
 import { missing } from './support';
 import { createViewer, type Margins, type Shading, type Up, type Viewer } from './viewer';
@@ -24,6 +24,7 @@ function start(viewer: Viewer): void {
     choose: () => input.click(),
     sample: () => void session.openSample(),
     fit: () => viewer.fit(),
+    flip: () => session.flip(),
     save: () => void session.save(),
     cancel: () => session.cancel(),
     dismiss: () => store.set({ error: undefined }),
@@ -40,7 +41,9 @@ function start(viewer: Viewer): void {
   addEventListener('keydown', (event) => {
     if (event.key === 'Escape' && store.state.job) session.cancel();
     const typing = event.target instanceof HTMLInputElement && event.target.type === 'text';
-    if (event.key === 'f' && !typing && !event.ctrlKey && !event.metaKey && !event.altKey) viewer.fit();
+    if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.key === 'f') viewer.fit();
+    if (event.key === 'b') store.set({ backs: !store.state.backs });
   });
 
   takeDrops(session);
@@ -100,10 +103,13 @@ function takeControls(session: Session, viewer: Viewer): void {
     store.set({ shading: value as Shading });
     if (value === 'curvature') void session.addCurvature();
   });
+  choose('orient', (value) => store.set({ orientKind: value as OrientKind }));
   choose('up', (value) => store.set({ up: value as Up }));
   choose('method', (value) => store.set({ method: value as Method, kText: String(METHODS[value as Method].k) }));
   choose('cell', (value) => chooseCell(store, value as CellKind));
 
+  const backs = element<HTMLInputElement>('#backs');
+  backs.addEventListener('change', () => store.set({ backs: backs.checked }));
   const size = element<HTMLInputElement>('#point-size');
   size.addEventListener('input', () => store.set({ pointSize: 2 ** size.valueAsNumber }));
   const cell = element<HTMLInputElement>('#cell-value');
@@ -118,6 +124,7 @@ function takeControls(session: Session, viewer: Viewer): void {
   let before = store.state;
   store.listen((state) => {
     if (state.shading !== before.shading) viewer.setShading(state.shading);
+    if (state.backs !== before.backs) viewer.setBacks(state.backs);
     if (state.up !== before.up) viewer.setUp(state.up);
     if (state.pointSize !== before.pointSize) viewer.setPointSize(state.pointSize);
     before = state;

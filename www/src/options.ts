@@ -1,8 +1,12 @@
 // The options form: what was chosen and typed, as options of `estimateNormals` or as the reason why it cannot be such.
 import type { EstimateOptions } from 'bilinormal';
+import type { Up } from './viewer';
 
 export type CellKind = 'auto' | 'scale' | 'size';
 export type Method = NonNullable<EstimateOptions['method']>;
+export type Orient = NonNullable<EstimateOptions['orient']>;
+/** Where the camera is and which way is up: known when the normals are computed. */
+export type OrientKind = 'none' | 'consistent' | 'outward' | 'camera' | 'up';
 
 /** The controls; numbers as typed. */
 export interface OptionsForm {
@@ -12,6 +16,7 @@ export interface OptionsForm {
   cellText: string;
   /** Of the other methods. */
   kText: string;
+  orientKind: OrientKind;
 }
 
 /** How the methods are called, and the k they begin with. */
@@ -41,6 +46,13 @@ export function parseOptions({ method, cellKind, cellText, kText }: OptionsForm)
   }
   if (value > 0 && value < Infinity) return { options: { cell: { size: value } } };
   return { problem: 'An edge length is a number above 0, in the unit of the file.' };
+}
+
+/** The chosen orientation, for a cloud with this axis upwards that is seen from `eye`. */
+export function orientOf(kind: OrientKind, up: Up, eye: [number, number, number]): Orient {
+  if (kind === 'camera') return { viewpoint: eye };
+  if (kind === 'up') return { up: up === 'z' ? [0, 0, 1] : [0, 1, 0] };
+  return kind;
 }
 
 const numberOf = (text: string) => (text.trim() === '' ? NaN : Number(text.trim().replace(',', '.')));

@@ -47,12 +47,19 @@ export function showState(store: Store): void {
     // To choose it starts a job, which must not end the one that runs.
     const wait = !scan?.hasNormals || (busy && !scan.hasCurvature);
     radio('shading', 'curvature').disabled = wait && state.shading !== 'curvature';
+    const backs = element<HTMLInputElement>('#backs');
+    backs.checked = state.backs;
+    backs.disabled = !scan?.hasNormals && !busy;
+    const flip = element<HTMLButtonElement>('[data-do=flip]');
+    flip.disabled = !scan?.hasNormals || busy;
+    flip.setAttribute('aria-pressed', String(state.flipped));
     element<HTMLButtonElement>('[data-do=save]').disabled = !scan?.hasNormals || busy;
 
     showOptions(state, busy);
     showError(error);
     showJob(state);
-    if (before?.scan !== scan || before?.report !== report) showResult(state);
+    const told = before?.scan === scan && before?.report === report && before?.flipped === state.flipped;
+    if (!told) showResult(state);
   });
 }
 
@@ -65,6 +72,7 @@ function check(name: string, value: string): void {
 function showOptions(state: State, busy: boolean): void {
   const { method, cellKind, cellText, kText, scan } = state;
   check('method', method);
+  check('orient', state.orientKind);
   check('cell', cellKind);
   const parsed = parseOptions(state);
   const problem = 'problem' in parsed ? parsed.problem : '';
@@ -125,7 +133,28 @@ function factsOf(report: Report, used: State['used']): HTMLElement[] {
   ];
 }
 
-function showResult({ scan, report, used }: State): void {
+/** How the signs were chosen: for surfaces, the largest one and which way it faces. */
+function signsOf({ components, points }: Report, { used, flipped }: State): HTMLElement[] {
+  if (components) {
+    const [largest] = components;
+    const facts = [fact(count(components.length), components.length === 1 ? 'surface' : 'surfaces')];
+    if (!largest) return facts;
+    const { side, confidence } = largest;
+    const open = flipped ? 'inwards' : 'outwards';
+    const middle = flipped ? 'towards the middle' : 'away from the middle';
+    return [
+      ...facts,
+      fact(`${measure((100 * largest.points) / points)}%`, 'in the largest'),
+      fact(side === 'air' ? open : middle, `with confidence ${confidence.toFixed(2)}`),
+    ];
+  }
+  if (typeof used?.orient !== 'object') return [];
+  if ('up' in used.orient) return [fact(flipped ? 'downwards' : 'upwards', 'throughout')];
+  return [fact(flipped ? 'away from the camera' : 'towards the camera', 'as it was')];
+}
+
+function showResult(state: State): void {
+  const { scan, report, used } = state;
   element('#status').hidden = scan === undefined;
   if (!scan) return;
   element('#total').textContent = report ? duration(report.milliseconds.total) : count(scan.points);
@@ -141,6 +170,7 @@ function showResult({ scan, report, used }: State): void {
 
   facts.append(
     ...factsOf(report, used),
+    ...signsOf(report, state),
     fact(count(report.unresolved), 'unresolved'),
     fact(count(report.threads), report.threads === 1 ? 'thread' : 'threads'),
   );

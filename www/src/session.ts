@@ -2,7 +2,7 @@
 // viewer.setNormals -> report. One job runs at a time; a new one cancels it. Curvature is computed while it is shown.
 import { estimateNormals, readPointCloud, writePly, type EstimateOptions } from 'bilinormal';
 import { boundsOf, guessUp } from './bounds';
-import { METHODS, parseOptions } from './options';
+import { METHODS, orientOf, parseOptions } from './options';
 import { colorsOf } from './ramp';
 import type { Store } from './state';
 import type { Viewer } from './viewer';
@@ -14,6 +14,8 @@ export interface Session {
   estimate(): Promise<void>;
   /** Sees to it that the curvature is there, if the normals are: of the same neighbourhoods. */
   addCurvature(): Promise<void>;
+  /** Turns all normals round, those on the screen and so those that are saved. */
+  flip(): void;
   save(): Promise<void>;
   cancel(): void;
 }
@@ -86,19 +88,29 @@ export function createSession(store: Store, viewer: Viewer): Session {
       readMilliseconds,
     };
     // An edge length belongs to the unit of the file before.
-    store.set({ scan, report: undefined, used: undefined, up, shading, cellKind: 'auto', cellText: '' });
+    store.set({
+      scan,
+      report: undefined,
+      used: undefined,
+      flipped: false,
+      up,
+      shading,
+      cellKind: 'auto',
+      cellText: '',
+    });
   }
 
   async function shade(step: Step): Promise<void> {
     const parsed = parseOptions(store.state);
     if ('problem' in parsed) throw new Error(parsed.problem);
-    await shadeBy(parsed.options, step);
+    const { orientKind, up } = store.state;
+    await shadeBy({ ...parsed.options, orient: orientOf(orientKind, up, viewer.eye()) }, false, step);
   }
 
-  async function shadeBy(options: EstimateOptions, step: Step): Promise<void> {
+  async function shadeBy(options: EstimateOptions, flipped: boolean, step: Step): Promise<void> {
     const { scan, shading } = store.state;
     if (!shown || !scan) return;
-    const { method = 'bilinear', k = 0 } = options;
+    const { method = 'bilinear', k = 0, orient = 'none' } = options;
     const curvature = shading === 'curvature';
     const what = `normals${curvature ? ' and curvature' : ''}${method === 'bilinear' ? '' : `, ${METHODS[method].name}`}`;
     const { report, ...result } = await estimateNormals(shown.positions, {
@@ -108,10 +120,11 @@ export function createSession(store: Store, viewer: Viewer): Session {
       onProgress: step.begin(`Computing ${what}`),
     });
     step.signal.throwIfAborted();
+    if (flipped) negate(result.normals);
     shown = { ...shown, result, options };
     viewer.setNormals(result.normals, result.curvature && colorsOf(result.curvature));
     const hasCurvature = result.curvature !== undefined;
-    store.set({ scan: { ...scan, hasNormals: true, hasCurvature }, report, used: { method, k } });
+    store.set({ scan: { ...scan, hasNormals: true, hasCurvature }, report, used: { method, k, orient }, flipped });
   }
 
   return {
@@ -132,7 +145,16 @@ export function createSession(store: Store, viewer: Viewer): Session {
 
     async addCurvature() {
       const { result, options } = shown ?? {};
-      if (result && options && !result.curvature) await run('Computing curvature', (step) => shadeBy(options, step));
+      if (!result || !options || result.curvature) return;
+      const { flipped } = store.state;
+      await run('Computing curvature', (step) => shadeBy(options, flipped, step));
+    },
+
+    flip() {
+      if (!shown?.result) return;
+      negate(shown.result.normals);
+      viewer.refreshNormals();
+      store.set({ flipped: !store.state.flipped });
     },
 
     save: () =>
@@ -149,6 +171,11 @@ export function createSession(store: Store, viewer: Viewer): Session {
       store.set({ job: undefined });
     },
   };
+}
+
+/** In place; a zero stays as it is, without a sign. */
+function negate(normals: Float32Array): void {
+  for (let i = 0; i < normals.length; i++) normals[i] = 0 - normals[i]!;
 }
 
 function makeSample(signal: AbortSignal): Promise<File> {

@@ -1,7 +1,7 @@
 // Everything the page shows besides the cloud itself, in one place. The session and the controls write it, `set` tells
 // the listeners, and the panel draws it: nothing reads the document to find out what is going on.
 import type { Report } from 'bilinormal';
-import type { Method, OptionsForm } from './options';
+import type { Method, OptionsForm, Orient } from './options';
 import type { Shading, Up } from './viewer';
 
 /** The cloud on the screen. */
@@ -29,10 +29,14 @@ export interface State extends OptionsForm {
   scan: Scan | undefined;
   report: Report | undefined;
   /** What the report is about. */
-  used: { method: Method; k: number } | undefined;
+  used: { method: Method; k: number; orient: Orient } | undefined;
+  /** Whether all normals point the other way than the report says. */
+  flipped: boolean;
   job: Job | undefined;
   error: string | undefined;
   shading: Shading;
+  /** Whether what points away from the camera has a colour of its own. */
+  backs: boolean;
   pointSize: number;
   up: Up;
 }
@@ -50,15 +54,18 @@ export function createStore(): Store {
     scan: undefined,
     report: undefined,
     used: undefined,
+    flipped: false,
     job: undefined,
     error: undefined,
     shading: 'shaded',
+    backs: false,
     pointSize: 1,
     up: 'y',
     method: 'bilinear',
     cellKind: 'auto',
     cellText: '',
     kText: '',
+    orientKind: 'none',
   };
   const listeners: ((state: Readonly<State>) => void)[] = [];
   return {

@@ -31,12 +31,18 @@ export interface Viewer {
   show(cloud: Cloud, bounds: Bounds, up: Up): void;
   /** `curvatureColors` (RGBA) are what the shading of that name shows; without them it shows the normals. */
   setNormals(normals: Float32Array, curvatureColors?: Uint8Array): void;
+  /** Draws the normals that it was given last again, because their values have changed. */
+  refreshNormals(): void;
   setShading(shading: Shading): void;
+  /** Whether what points away from the eye has a colour of its own, or looks as from the front. */
+  setBacks(shown: boolean): void;
   /** 1 is the size at which the points of a surface just about close it. */
   setPointSize(size: number): void;
   setUp(up: Up): void;
   /** Frames the whole cloud from the first point of view. */
   fit(): void;
+  /** Where the camera is, in the coordinates of the cloud's positions. */
+  eye(): [number, number, number];
   /** Pixels at the edges that are covered: the cloud is framed in the rest. */
   setMargins(margins: Margins): void;
 }
@@ -47,6 +53,9 @@ export interface Margins {
   bottom: number;
   left: number;
 }
+
+/** No scan has this colour, nor has the ramp of the curvature. In style.css, too. */
+const BACK = '#ff3d8b';
 
 /** While the camera moves, clouds above this size may be drawn in part, if whole frames take too long. */
 const SPARSE_FROM = 200_000;
@@ -231,8 +240,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     const box = canvas.getBoundingClientRect();
     const x = ((event.clientX - box.left) / box.width) * 2 - 1;
     const y = 1 - ((event.clientY - box.top) / box.height) * 2;
-    points.updateWorldMatrix(true, false);
-    const eye = points.worldToLocal(camera.position.clone());
+    const eye = new Vector3(...viewer.eye());
     const along = points
       .worldToLocal(new Vector3(x, y, 0.5).unproject(camera))
       .sub(eye)
@@ -289,6 +297,15 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       chooseShading();
       request();
     },
+    refreshNormals() {
+      const normals = whole.getAttribute('normal');
+      if (normals) normals.needsUpdate = true;
+      request();
+    },
+    setBacks(shown) {
+      material.backColor = shown ? BACK : null;
+      request();
+    },
     setShading(next) {
       shading = next;
       chooseShading();
@@ -303,6 +320,10 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       request();
     },
     fit,
+    eye() {
+      points.updateWorldMatrix(true, false);
+      return points.worldToLocal(camera.position.clone()).toArray();
+    },
     setMargins(next) {
       margins = next;
       resize();
