@@ -19,6 +19,8 @@ struct Level {
     links: Links,
     /// For each group, what speaks for its sign by itself.
     own: Vec<f32>,
+    /// For each group, how many patches it has.
+    sizes: Vec<u32>,
     /// The group of the next level.
     group: Vec<u32>,
     /// Whether it is flipped in it.
@@ -31,19 +33,25 @@ struct Level {
 /// Rounds of Boruvka's: every group merges with the one that it has the strongest evidence for or against, and the evidence
 /// between the merged ones is added up, so that many weak links outvote a strong wrong one. A round at least halves the
 /// groups that have links: linear in the links. Then back from the last to the first: whatever gains by being flipped is.
-pub(super) fn signs(links: Links, own: Vec<f32>, stage: &Stage) -> Result<Signs, Error> {
+///
+/// What speaks for the patches of a group adds up like its area, the evidence of its neighbours only like its rim. Beyond
+/// `span` patches the former is made to grow like the rim too.
+pub(super) fn signs(links: Links, own: Vec<f32>, span: f32, stage: &Stage) -> Result<Signs, Error> {
     let patches = links.len();
     let mut levels = Vec::new();
-    let (mut links, mut own) = (links, own);
+    let (mut links, mut own, mut sizes) = (links, own, vec![1; patches]);
     let mut component: Vec<u32> = (0..patches as u32).collect();
     let mut count = patches;
     stage.tell(0.0)?;
-    while let Some((group, flipped, groups)) = merge(&links) {
+    while let Some((group, flipped, groups)) = merge(&links, &sizes) {
         let (merged, sums) = gather(&links, &own, &group, &flipped, groups)?;
+        let mut counts = vec![0; groups];
+        group.iter().zip(&sizes).for_each(|(&group, &size)| counts[group as usize] += size);
         component.iter_mut().for_each(|component| *component = group[*component as usize]);
         levels.push(Level {
             links: std::mem::replace(&mut links, merged),
             own: std::mem::replace(&mut own, sums),
+            sizes: std::mem::replace(&mut sizes, counts),
             group,
             flipped,
         });
@@ -53,9 +61,10 @@ pub(super) fn signs(links: Links, own: Vec<f32>, stage: &Stage) -> Result<Signs,
     // From the last level to the first; `trust` is the weight of what speaks for a sign by itself.
     let descend = |trust: f32| {
         let mut flipped: Vec<bool> = own.iter().map(|own| *own < 0.0).collect();
-        for Level { links, own, group, flipped: within } in levels.iter().rev() {
+        for Level { links, own, sizes, group, flipped: within } in levels.iter().rev() {
             flipped = group.iter().zip(within).map(|(&group, within)| within ^ flipped[group as usize]).collect();
-            mend(links, own, trust, &mut flipped);
+            let share = |(own, &size): (&f32, &u32)| trust * own * (span / size as f32).sqrt().min(1.0);
+            mend(links, &own.iter().zip(sizes).map(share).collect::<Vec<f32>>(), &mut flipped);
         }
         flipped
     };
@@ -74,11 +83,15 @@ pub(super) fn signs(links: Links, own: Vec<f32>, stage: &Stage) -> Result<Signs,
                 *flipped = bold;
             }
         }
-        mend(links, own, 1.0, &mut flipped);
+        mend(links, own, &mut flipped);
     }
     stage.tell(1.0)?;
     Ok(Signs { flipped, component, components: count })
 }
+
+/// Groups that agree no better than this, for each patch along the side of a square of as many as the smaller has, only touch:
+/// they are surfaces of their own.
+const TOUCH: f32 = 0.03;
 
 /// How much more than by rights the second choice trusts what speaks for a sign by itself.
 const BOLDNESS: f32 = 3.0;
@@ -101,7 +114,7 @@ fn score(links: &Links, own: &[f32], flipped: &[bool], one: usize) -> f64 {
 /// The group of each, and whether it is flipped against the group's first; and how many groups. `None` when no two are
 /// linked any more.
 #[inline(never)]
-fn merge(links: &Links) -> Option<(Vec<u32>, Vec<bool>, usize)> {
+fn merge(links: &Links, sizes: &[u32]) -> Option<(Vec<u32>, Vec<bool>, usize)> {
     let count = links.len();
     // Towards the root of the group, and whether flipped against it.
     let mut parents: Vec<(u32, bool)> = (0..count as u32).map(|one| (one, false)).collect();
@@ -114,7 +127,8 @@ fn merge(links: &Links) -> Option<(Vec<u32>, Vec<bool>, usize)> {
                 best = link;
             }
         }
-        if best.evidence == 0.0 {
+        let size = sizes[one].min(sizes[best.to as usize]);
+        if best.evidence.abs() <= TOUCH * (size as f32).sqrt() {
             continue;
         }
         let ((a, a_flipped), (b, b_flipped)) = (root(&mut parents, one as u32), root(&mut parents, best.to));
@@ -214,7 +228,7 @@ fn gather(
 
 /// Flips what gains by it, until nothing does; each flip raises the sum of all evidence.
 #[inline(never)]
-fn mend(links: &Links, own: &[f32], trust: f32, flipped: &mut [bool]) {
+fn mend(links: &Links, own: &[f32], flipped: &mut [bool]) {
     const ROUNDS: usize = 16;
     /// Less is rounding.
     const LEAST: f32 = 1e-6;
@@ -226,7 +240,7 @@ fn mend(links: &Links, own: &[f32], trust: f32, flipped: &mut [bool]) {
             if !std::mem::take(&mut is_stirred[one]) {
                 continue;
             }
-            if support(links, flipped, one) + signed(flipped[one], trust * own[one]) < -LEAST {
+            if support(links, flipped, one) + signed(flipped[one], own[one]) < -LEAST {
                 flipped[one] = !flipped[one];
                 any = true;
                 links.from(one).iter().for_each(|link| is_stirred[link.to as usize] = true);

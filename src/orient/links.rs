@@ -25,11 +25,8 @@ pub(super) struct Links {
     pub all: Vec<Link>,
 }
 
-/// The evidence of two patches that face each other.
-const FACING: f32 = 0.3;
-
-/// How many times the noise they are apart at least.
-const DEVIATIONS: f32 = 10.0;
+/// With less noise the patches of a surface lie on arcs nearly exactly; what does not is another sheet nearby.
+const CLEAN: f32 = 0.05;
 
 /// Less is no evidence, and costs memory.
 const LEAST: f32 = 0.01;
@@ -38,7 +35,7 @@ impl Links {
     /// Links every patch to those in its cube and the 26 round it; `noise` is that of the points, in edges. One pass over the
     /// patches.
     pub fn of(grid: &Grid, patches: &Patches, noise: f32, stage: &Stage) -> Result<Self, Error> {
-        let apart = DEVIATIONS * noise;
+        let sharpness = if noise < CLEAN { 15 } else { 5 };
         let found = Gathering::new("the graph of patches");
         stage.run(grid.blocks.len(), &|block| {
             let mut surroundings = Surroundings::new();
@@ -52,7 +49,7 @@ impl Links {
                             let cube = surroundings.cube(Places::of_near(bit, near));
                             let step = NEAR[near as usize % 64].xyz();
                             for to in patches.first[cube]..patches.first[cube + 1] {
-                                let evidence = evidence(patch, &patches.all[to as usize], step, apart);
+                                let evidence = evidence(patch, &patches.all[to as usize], step, sharpness);
                                 if to != own && evidence.abs() > LEAST {
                                     links.push(Link { to, evidence });
                                 }
@@ -99,11 +96,8 @@ impl Links {
 /// of a circle are each other's picture, also at a right-angled crease and on the two sides of a thin plate, where the
 /// normals alone say nothing, or the opposite (after Xie, McDonnell and Qin, "Surface reconstruction of noisy and defective
 /// data sets", 2004). What counts less: a line along the normals, and one that meets them at different angles, as on no arc.
-///
-/// Along the normals two patches may be noise of one surface; if they are further apart than that, `apart` in edges, they are
-/// two sides of a wall or of a gap, and face away from each other or towards each other.
 #[inline(always)]
-fn evidence(a: &Patch, b: &Patch, step: Vec3, apart: f32) -> f32 {
+fn evidence(a: &Patch, b: &Patch, step: Vec3, sharpness: i32) -> f32 {
     let line = step + b.centre - a.centre;
     let square = line.length_squared();
     let dot = a.normal.dot(b.normal);
@@ -113,9 +107,6 @@ fn evidence(a: &Patch, b: &Patch, step: Vec3, apart: f32) -> f32 {
     let length = square.sqrt();
     let (x, y) = (line.dot(a.normal) / length, line.dot(b.normal) / length);
     let reflected = dot - 2.0 * (x * y);
-    let (facing, skew) = ((x * y).abs(), (x.abs() - y.abs()).abs());
-    let arc = (1.0 - facing) * (1.0 - skew);
-    let is_wall = length * facing > apart;
-    reflected.signum() * reflected.powi(6) * arc.powi(3)
-        + if is_wall { FACING * reflected * facing.powi(8) } else { 0.0 }
+    let (x, y) = (x.abs(), y.abs());
+    reflected.powi(sharpness) * (1.0 - x * y) * (1.0 - (x - y).abs()).powi(3)
 }

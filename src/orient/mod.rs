@@ -57,9 +57,13 @@ const POINTS_PER_CELL: f64 = 16.0;
 
 /// Where points lie further off their planes, in edges, the cubes are too small: uniform points in a cube lie 0.29 off its
 /// middle.
-const LARGEST_NOISE: f32 = 0.23;
+const LARGEST_NOISE: f32 = 0.28;
 const ENLARGEMENT: f64 = 1.25;
 const ENLARGEMENTS: u32 = 3;
+
+/// How many patches of a group count fully for what lies in the open. Few: an open box, or the corner of a room, is seen from
+/// its wrong side too, and its edges must outweigh that; at most as many as a spike has.
+const SPAN: f32 = 4.0;
 
 /// Where less of the surface than this looks into the open on one side only, the air says nothing.
 const LEAST_CONFIDENCE: f64 = 0.2;
@@ -82,8 +86,8 @@ pub(crate) fn orient(
             face(points, normals, &|point| viewpoint - point.as_dvec3(), stage).map(|()| None)
         }
         Orient::Up(up) => face(points, normals, &|_| DVec3::from(up), stage).map(|()| None),
-        Orient::Consistent => surfaces(points, normals, bounds, 1.0, stage).map(Some),
-        Orient::Outward => surfaces(points, normals, bounds, 3.0, stage).map(Some),
+        Orient::Consistent => surfaces(points, normals, bounds, SPAN, stage).map(Some),
+        Orient::Outward => surfaces(points, normals, bounds, f32::INFINITY, stage).map(Some),
     }
 }
 
@@ -107,20 +111,19 @@ fn face(
     })
 }
 
-/// One sign for each surface, outwards. `trust` is the weight of the open air against that of the neighbours.
+/// One sign for each surface, outwards. Up to `span` patches what lies in the open counts by area.
 fn surfaces(
     points: &Points,
     normals: &mut [Vec3],
     bounds: &Bounds,
-    trust: f32,
+    span: f32,
     stage: &Stage,
 ) -> Result<Vec<Component>, Error> {
     let (grid, noise) = sort(points, normals, bounds, &stage.part(0.0..0.35))?;
     let patches = Patches::of(&grid, normals, noise, &stage.part(0.35..0.5))?;
     let exposure = air::exposure(&grid, &patches, points.len(), &stage.part(0.5..0.55))?;
     let links = Links::of(&grid, &patches, noise, &stage.part(0.55..0.7))?;
-    let evidence = exposure.iter().map(|exposure| trust * exposure).collect();
-    let mut signs = groups::signs(links, evidence, &stage.part(0.7..0.95))?;
+    let mut signs = groups::signs(links, exposure.clone(), span, &stage.part(0.7..0.95))?;
     let components = decide(&grid, &patches, &exposure, &mut signs);
     turn(&grid, &patches, &signs.flipped, normals, &stage.part(0.95..1.0))?;
     Ok(components)

@@ -58,7 +58,7 @@ const COSINE_SQUARED: f32 = 0.72;
 /// How far from the plane of a patch a point may lie to join it, in edges: little, because thin walls have both sides in one
 /// cube; but noise must not tear a surface into layers, so no less than so many times the noise.
 const THICKNESS: f32 = 0.1;
-const DEVIATIONS: f32 = 2.5;
+const DEVIATIONS: f32 = 2.2;
 
 impl Patches {
     /// One pass over the points; `noise` is that of [`noise`].
@@ -113,28 +113,38 @@ impl Patches {
     }
 }
 
-/// How far points lie off their cube's plane, in edges: the root mean square that half of the cubes do not exceed. Looks at
-/// every eighth brick.
+/// How far points lie off their surface, in edges: the deviation that half of the cubes do not exceed. Looks at every eighth
+/// brick.
+///
+/// From how far apart points are along the normal, one next to the other: both sides of a thin wall in one cube are no noise.
 pub(super) fn noise(grid: &Grid, normals: &[Vec3]) -> f32 {
     const STEP: usize = 8;
     /// Fewer points lie on a plane in any case.
     const LEAST: usize = 4;
-    let mut deviations = Vec::new();
+    /// Of normally distributed points, the median of the gaps between neighbours times the number of points, in deviations.
+    const GAPS: f32 = 2.2;
+    let (mut deviations, mut places) = (Vec::new(), Vec::new());
     for brick in (0..grid.bricks.len()).step_by(STEP) {
         for (points, _) in grid.cubes_of(brick).filter(|(points, _)| points.len() >= LEAST) {
-            let (mut place, mut normal) = (Vec3::ZERO, Vec3::ZERO);
+            let mut normal = Vec3::ZERO;
             for point in points {
                 let own = normals[point.point as usize];
-                place += point.local;
                 normal += if normal.dot(own) < 0.0 { -own } else { own };
             }
-            let (place, normal) = (place / points.len() as f32, normal.normalize_or_zero());
-            let squares = points.iter().map(|point| (point.local - place).dot(normal)).map(|off| off * off);
-            deviations.push((squares.sum::<f32>() / points.len() as f32).sqrt());
+            let normal = normal.normalize_or_zero();
+            places.clear();
+            places.extend(points.iter().map(|point| point.local.dot(normal)));
+            places.sort_unstable_by(f32::total_cmp);
+            let mut gaps: Vec<f32> = places.windows(2).map(|pair| pair[1] - pair[0]).collect();
+            deviations.push(median(&mut gaps) * points.len() as f32 / GAPS);
         }
     }
-    let middle = deviations.len() / 2;
-    if deviations.is_empty() { 0.0 } else { *deviations.select_nth_unstable_by(middle, f32::total_cmp).1 }
+    if deviations.is_empty() { 0.0 } else { median(&mut deviations) }
+}
+
+fn median(values: &mut [f32]) -> f32 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
 /// Parts the points of one cube; `normals` are theirs.
