@@ -3,7 +3,7 @@
 // variants or both ("cube", "noise0.6", "cube-clean"): printed, and not written.
 
 import { existsSync, mkdirSync, writeFileSync } from 'node:fs';
-import { availableParallelism, cpus } from 'node:os';
+import { availableParallelism } from 'node:os';
 import { join, resolve } from 'node:path';
 import { parseArgs } from 'node:util';
 import { build } from '../scripts/build.mjs';
@@ -12,18 +12,12 @@ import { setup } from '../scripts/setup.mjs';
 import { FULL, chosenRows, measureAll, plannedRows } from './accuracy/measure.mjs';
 import { readMeshes } from './accuracy/meshes.mjs';
 import { details, report } from './accuracy/report.mjs';
+import { machine } from './machine.mjs';
 
 const OPTIONS = { meshes: { type: 'string' }, out: { type: 'string' }, rows: { type: 'string' } };
 
 /** npm changes into the project's folder; names are meant from where the user stands. */
 const fromUser = (path) => path && resolve(process.env.INIT_CWD ?? '.', path);
-
-const machine = () => ({
-  model: cpus()[0].model.trim(),
-  cores: cpus().length,
-  node: process.versions.node,
-  date: new Date().toLocaleDateString('en-GB', { day: 'numeric', month: 'long', year: 'numeric' }),
-});
 
 function choose(rows, names) {
   try {

@@ -31,7 +31,7 @@ export function cloudOf(sampler, count, { noise, keep }, seed) {
     normals.set(sample.subarray(3), at);
     at += 3;
   }
-  if (noise) blur(positions, noise * diagonal(positions, normals), mulberry(Math.imul(seed, 0x85ebca6b)));
+  if (noise) blur(positions, noise * diagonal({ positions, normals }), mulberry(Math.imul(seed, 0x85ebca6b)));
   return { positions, normals };
 }
 
@@ -60,7 +60,8 @@ function box({ positions, normals }) {
   return { low, side: high.map((value, axis) => value - low[axis]) };
 }
 
-const diagonal = (positions, normals) => Math.hypot(...box({ positions, normals }).side);
+/** Of the box of the points on the surface. */
+export const diagonal = (cloud) => Math.hypot(...box(cloud).side);
 
 function blur(positions, deviation, random) {
   for (let i = 0; i < positions.length; i++) {

@@ -16,8 +16,8 @@ const KNOWN = {
 };
 
 /**
- * The meshes among the PLY files of a folder, also gzipped, `{ name, about, sampler }`; and the others, each with the
- * reason. Nothing of the folder's path comes out.
+ * The meshes among the PLY files of a folder, also gzipped, `{ name, about, mesh, sampler }`; and the others, each with
+ * the reason. Nothing of the folder's path comes out.
  */
 export function readMeshes(folder) {
   const [meshes, skipped] = [[], []];
@@ -26,8 +26,8 @@ export function readMeshes(folder) {
     const name = file.replace(/\.ply(\.gz)?$/i, '');
     try {
       const bytes = readFileSync(join(folder, file));
-      const sampler = meshSampler(/\.gz$/i.test(file) ? gunzipSync(bytes) : bytes);
-      meshes.push({ name, about: KNOWN[name], sampler });
+      const mesh = readMesh(/\.gz$/i.test(file) ? gunzipSync(bytes) : bytes);
+      meshes.push({ name, about: KNOWN[name], mesh, sampler: samplerOf(mesh) });
     } catch ({ message }) {
       skipped.push({ name: file, reason: message });
     }
@@ -57,9 +57,10 @@ const METHODS = {
   double: 'getFloat64',
 };
 
+export const meshSampler = (bytes) => samplerOf(readMesh(bytes));
+
 /** A sampler, as of a shape, that covers the mesh evenly. Throws when there are no triangles. */
-export function meshSampler(bytes) {
-  const { vertices, triangles } = readMesh(bytes);
+function samplerOf({ vertices, triangles }) {
   const ends = [];
   const faces = [];
   let total = 0;
@@ -97,7 +98,8 @@ function first(values, value) {
   return low;
 }
 
-function readMesh(bytes) {
+/** `{ vertices, triangles }`: places, and three indices each. */
+export function readMesh(bytes) {
   const { format, elements, end } = header(bytes);
   const has = (name) => elements.some((element) => element.name === name);
   if (!has('face') && !has('tristrips')) throw new Error('no faces');

@@ -1,8 +1,8 @@
 // Measures, takes the pictures, writes the report.
 
 import { mkdirSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
-import { cpus } from 'node:os';
 import { join } from 'node:path';
+import { machine } from '../machine.mjs';
 import { measureAll } from './experiments.mjs';
 import { takePictures } from './pictures.mjs';
 import { charts, report } from './report.mjs';
@@ -40,10 +40,3 @@ export async function reproduce({ createEstimator, plan, scans: scansFolder, out
     estimator.dispose();
   }
 }
-
-const machine = () => ({
-  model: cpus()[0].model.trim(),
-  cores: cpus().length,
-  node: process.versions.node,
-  date: new Date().toLocaleDateString('en-GB', { day: 'numeric', month: 'long', year: 'numeric' }),
-});

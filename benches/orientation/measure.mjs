@@ -1,0 +1,152 @@
+// The measurements: rows of clouds with known signs, as plain numbers.
+
+import { VARIANTS, cloudOf, diagonal } from '../accuracy/clouds.mjs';
+import { rightSigns } from './judge.mjs';
+import { SHAPES, turned } from './shapes.mjs';
+import { cornersOf, hidden, signedVolume, thickness } from './solid.mjs';
+
+export const MODES = ['consistent', 'outward'];
+
+/** Of each estimate, unless its runs have taken so many milliseconds; the fastest counts. */
+export const RUNS = 3;
+export const ENOUGH = 3_000;
+
+/** A wall is thick that is more than so many times the deviation of the noise. */
+export const THICK = 10;
+
+const MESH_SEED = 101;
+/** Of a mesh's surface more may not lie inside of it: its signs would be a matter of opinion. */
+const MOST_HIDDEN = 0.02;
+
+/** How much is measured. */
+export const FULL = {
+  rows: Object.entries(SHAPES).flatMap(([name, { noise = 'noise0.6' }]) =>
+    ['clean', noise].map((variant) => ({ name, variant })),
+  ),
+  points: 100_000,
+  meshVariants: Object.keys(VARIANTS),
+};
+/** For tests: seconds. */
+export const SMALL = {
+  rows: ['sphere', 'terrain', 'moebius'].map((name) => ({ name, variant: 'clean' })),
+  points: 15_000,
+  meshVariants: ['clean', 'noise0.6'],
+};
+
+/**
+ * Meshes as `readMeshes` gives them -> `{ meshes, skipped, notes }`: wound outwards, and without those that overlap
+ * themselves; `corners` of the triangles and `diagonal` of the box are added.
+ */
+export function withOutside(read) {
+  const [meshes, skipped, notes] = [[], [], new Map()];
+  for (const { name, about, mesh, sampler } of read) {
+    const corners = cornersOf(mesh);
+    const isInward = signedVolume(corners) < 0;
+    const outward = isInward ? turned(sampler) : sampler;
+    const size = diagonal(cloudOf(sampler, 2_000, {}, MESH_SEED));
+    const inside = hidden(corners, outward, size);
+    if (inside > MOST_HIDDEN) {
+      skipped.push({
+        name,
+        reason: `overlaps itself: ${Math.round(100 * inside)} % of its surface is not its outside`,
+      });
+      continue;
+    }
+    if (isInward) notes.set(name, 'wound inwards, so turned');
+    meshes.push({ name, about, corners, sampler: outward });
+  }
+  return { meshes, skipped, notes };
+}
+
+/**
+ * The rows of a plan: each with a function `cloud` that answers `{ positions, normals }`, and for noisy meshes `walls`,
+ * which answers how thick the wall behind each point is, in deviations of the noise. `scans`: `{ name, about, positions, normals }`.
+ */
+export function plannedRows({ rows, points, meshVariants }, meshes, scans = []) {
+  const shapes = Object.keys(SHAPES);
+  return [
+    ...rows.map(({ name, variant }) => {
+      const { shape, open = false, sides = true } = SHAPES[name];
+      const cloud = () => cloudOf(shape(points), points, VARIANTS[variant], 1 + shapes.indexOf(name));
+      return { name, variant, kind: 'shape', open, sides, cloud };
+    }),
+    ...meshes.flatMap(({ name, about, corners, sampler }) => {
+      const walls = once(() => wallsOf(corners, cloudOf(sampler, points, {}, MESH_SEED)));
+      return meshVariants.map((variant) => ({
+        name,
+        about,
+        variant,
+        kind: 'mesh',
+        open: false,
+        sides: true,
+        cloud: () => cloudOf(sampler, points, VARIANTS[variant], MESH_SEED),
+        // The noisy points are those of the clean cloud, moved.
+        walls: VARIANTS[variant].noise && (() => walls().map((wall) => wall / VARIANTS[variant].noise)),
+      }));
+    }),
+    ...scans.map(({ name, about, ...cloud }) => ({
+      name,
+      about,
+      variant: 'as it is',
+      kind: 'ranges',
+      open: false,
+      sides: true,
+      cloud: () => cloud,
+    })),
+  ];
+}
+
+/** How thick the walls behind the points of a clean cloud are, as shares of its diagonal. */
+function wallsOf(corners, cloud) {
+  const size = diagonal(cloud);
+  return thickness(corners, cloud, 2e-5 * size).map((wall) => wall / size);
+}
+
+function once(job) {
+  let result;
+  return () => (result ??= job());
+}
+
+/** Measures every row; `tell` hears what is being measured. `estimator` has one thread. */
+export async function measureAll(estimator, rows, { tell }) {
+  await warmUp(estimator);
+  const results = [];
+  for (const { cloud, walls, ...row } of rows) {
+    tell(`${row.name}, ${row.variant}`);
+    const { positions, normals: truth } = cloud();
+    const thick = walls?.().map((wall) => wall > THICK);
+    const modes = {};
+    for (const mode of MODES) {
+      const { normals, report, seconds } = await timed(estimator, positions, { orient: mode });
+      const signs = { all: rightSigns(normals, truth) };
+      if (thick) {
+        signs.thick = rightSigns(normals, truth, (i) => thick[i] === 1);
+        signs.thin = rightSigns(normals, truth, (i) => thick[i] === 0);
+      }
+      const { components } = report;
+      modes[mode] = { signs, components: components.length, largest: components[0], seconds };
+    }
+    results.push({ ...row, points: positions.length / 3, modes });
+  }
+  return results;
+}
+
+/** The engine compiles what is hot once more, better: not during what counts. */
+async function warmUp(estimator) {
+  const { positions } = cloudOf(SHAPES.sphere.shape(), 50_000, {}, 1);
+  for (const mode of MODES) await estimator.estimateNormals(positions, { orient: mode });
+}
+
+/** A result, and the seconds for a million points, of the orientation and of all, of the fastest run. */
+async function timed(estimator, positions, options) {
+  const fastest = { orientation: Infinity, total: Infinity };
+  let [result, spent] = [undefined, 0];
+  for (let run = 0; run < RUNS && spent < ENOUGH; run++) {
+    result = await estimator.estimateNormals(positions, options);
+    const { milliseconds, points } = result.report;
+    spent += milliseconds.total;
+    for (const phase of Object.keys(fastest))
+      fastest[phase] = Math.min(fastest[phase], (1_000 * milliseconds[phase]) / points);
+  }
+  return { normals: result.normals, report: result.report, seconds: fastest };
+}

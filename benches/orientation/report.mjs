@@ -1,0 +1,192 @@
+// Rows to text: docs/orientation-bench.md.
+
+import { percent, table } from '../paper/format.mjs';
+import { MOST_SECONDS, counted, verdicts } from './judge.mjs';
+import { ENOUGH, MODES, RUNS, THICK } from './measure.mjs';
+
+const paragraphs = (...parts) => parts.filter(Boolean).join('\n\n');
+/** Never rounded up: all right is told from nearly all. */
+const share = (value) => `${value === 1 ? '100' : (Math.floor(1e5 * value + 1e-6) / 1e3).toFixed(3)} %`;
+const asPercent = (value) => `${Number((100 * value).toFixed(1))} %`;
+const seconds = (value) => value.toFixed(3);
+const least = (rows, value) => rows.reduce((a, b) => (value(b) < value(a) ? b : a));
+const fullName = ({ name, variant }) => `${name}, ${variant}`;
+const side = ({ side, confidence }) => `${side} ${confidence.toFixed(2)}`;
+
+/** The whole text. `skipped`: files of the folder that were not measured; `notes`: what was done to others, by name. */
+export function report(rows, { machine, minutes, hasFolder, skipped, notes, peers }) {
+  const { model, cores, node, date } = machine;
+  return `${paragraphs(
+    '# Orientation, measured',
+    "Signs by `orient: 'consistent'` and `'outward'` against true ones, on generated shapes, on points sampled on meshes, and on range scans. Written by `npm run orientation`, text and all; not to be edited.",
+    `${model}, ${cores} cores, Node ${node}, ${date}; took ${minutes.toFixed(1)} minutes. Shares are of the points with a true normal, and never rounded up; a point without a normal is not right. Normals must point outwards; those of an open surface, marked ○, either all to one side or all to the other. Clear: without the points whose normal is more than 60 degrees off the true one, either way; at sharp edges and in noise these have the normal of another face, and their sign says little. What is asked counts all points. Times are of WebAssembly in Node with one thread, in seconds for a million points, the fastest of ${RUNS} runs, or of fewer where these take more than ${ENOUGH / 1_000} seconds.`,
+    `Noise is normally distributed, its standard deviation a share of the diagonal of the box; stripes and gradient are patterns of density (benches/accuracy/clouds.mjs). A wall is thick that is more than ${THICK} times the deviation of the noise, along the inward normal, or that has no other side.`,
+    '## In short',
+    overview(rows),
+    '## Each row',
+    details(rows),
+    withoutSides(rows),
+    peers && paragraphs('## Beside others', beside(rows, peers)),
+    hasFolder ? sources(rows, skipped, notes) : 'Skipped: no meshes; none were given (`--meshes FOLDER`).',
+  )}\n`;
+}
+
+function overview(rows) {
+  const all = rows.flatMap((row) => verdicts(row).map((verdict) => ({ ...verdict, row })));
+  const kinds = [...new Set(all.map(({ kind }) => kind))];
+  const signs = kinds.flatMap((kind) =>
+    MODES.map((mode) => {
+      const group = all.filter((verdict) => verdict.kind === kind && verdict.mode === mode);
+      const worst = least(group, ({ share }) => share);
+      const met = group.filter(({ met }) => met).length;
+      return [
+        `${kind}: ${mode}`,
+        asPercent(worst.least),
+        `${share(worst.share)} (${fullName(worst.row)})`,
+        `${met} of ${group.length}`,
+        verdict(met === group.length),
+      ];
+    }),
+  );
+  const times = MODES.map((mode) => {
+    const slowest = least(rows, ({ modes }) => -modes[mode].seconds.orientation);
+    const met = rows.filter(({ modes }) => modes[mode].seconds.orientation <= MOST_SECONDS).length;
+    return [
+      `seconds for a million points: ${mode}`,
+      MOST_SECONDS,
+      `${seconds(slowest.modes[mode].seconds.orientation)} (${fullName(slowest)})`,
+      `${met} of ${rows.length}`,
+      verdict(met === rows.length),
+    ];
+  });
+  return table(['what', 'asked', 'worst', 'rows that meet it', 'verdict'], [...signs, ...times]);
+}
+
+const verdict = (isMet) => (isMet ? 'met' : '**missed**');
+
+/** One line for each row whose sides are known. */
+export function details(rows) {
+  const known = rows.filter(({ sides }) => sides);
+  if (known.length === 0) return '';
+  const hasWalls = known.some((row) => row.modes[MODES[0]].signs.thick);
+  const part = (row, name) =>
+    MODES.map((mode) => {
+      const signs = row.modes[mode].signs[name];
+      return signs?.points > 0 ? share(counted(row, signs)) : '';
+    });
+  const thick = (row) => {
+    const { signs } = row.modes[MODES[0]];
+    return [
+      signs.thick ? percent(signs.thick.points / signs.all.points) : '',
+      ...part(row, 'thick'),
+      ...part(row, 'thin'),
+    ];
+  };
+  return table(
+    [
+      'row',
+      ...MODES,
+      ...MODES.map((mode) => `clear: ${mode}`),
+      'asked',
+      ...(hasWalls ? ['thick', ...MODES.map((mode) => `thick: ${mode}`), ...MODES.map((mode) => `thin: ${mode}`)] : []),
+      'surfaces',
+      ...MODES.map((mode) => `largest: ${mode}`),
+      ...MODES.map((mode) => `s: ${mode}`),
+      's: all',
+    ],
+    known.map((row) => [
+      `${fullName(row)}${row.open ? ' ○' : ''}`,
+      ...part(row, 'all'),
+      ...MODES.map((mode) => share(counted(row, row.modes[mode].signs.all.clear))),
+      judged(row),
+      ...(hasWalls ? thick(row) : []),
+      ...facts(row),
+    ]),
+  );
+}
+
+/** What is asked of a row, which modes miss it, and whether they do so only by normals of other faces. */
+function judged(row) {
+  const all = verdicts(row);
+  const missed = all.filter(({ met }) => !met);
+  const asked = [...new Set(all.map(({ least }) => asPercent(least)))].join(', ');
+  if (missed.length === 0) return `${asked}: met`;
+  const modes = MODES.filter((mode) => missed.some((verdict) => verdict.mode === mode));
+  const isClearMet = missed.every(({ clear }) => clear);
+  return `${asked}: **missed** by ${modes.join(' and ')}${isClearMet ? ', met where clear' : ''}`;
+}
+
+const facts = ({ modes }) => {
+  const all = MODES.map((mode) => modes[mode]);
+  return [
+    [...new Set(all.map(({ components }) => components))].join(' / '),
+    ...all.map(({ largest }) => side(largest)),
+    ...all.map(({ seconds: { orientation } }) => seconds(orientation)),
+    seconds(all[0].seconds.total),
+  ];
+};
+
+/** Rows of surfaces with one side only: no signs are right, and only the report can tell. */
+export function withoutSides(rows) {
+  const without = rows.filter(({ sides }) => !sides);
+  if (without.length === 0) return '';
+  return paragraphs(
+    'A Moebius band has one side only: no signs are right, and the confidence should say so.',
+    table(
+      ['row', 'surfaces', ...MODES.map((mode) => `largest: ${mode}`), ...MODES.map((mode) => `s: ${mode}`), 's: all'],
+      without.map((row) => [fullName(row), ...facts(row)]),
+    ),
+  );
+}
+
+/** `peers`: as `readPeers` gives them. All up to one flip, which is all that they promise. */
+function beside(rows, peers) {
+  const methods = [...new Set(peers.map(({ method }) => method))];
+  const names = rows.filter((row) => row.sides && peers.some((peer) => peer.row === rowName(row)));
+  const cell = (row, method) => {
+    const found = peers.find((peer) => peer.row === rowName(row) && peer.method === method);
+    if (!found) return '';
+    return Number.isFinite(found.share) ? `${share(found.share)}, ${found.seconds.toFixed(1)} s` : 'no answer';
+  };
+  return paragraphs(
+    'Shares up to one flip of all signs, and the seconds for the cloud on one thread, normals included; by benches/peers/orientation.py.',
+    table(
+      ['row', ...MODES, ...methods],
+      names.map((row) => [
+        fullName(row),
+        ...MODES.map((mode) => {
+          const { signs, seconds } = row.modes[mode];
+          return `${share(signs.all.eitherWay)}, ${((seconds.total * row.points) / 1e6).toFixed(1)} s`;
+        }),
+        ...methods.map((method) => cell(row, method)),
+      ]),
+    ),
+  );
+}
+
+/** The name of a row in files. */
+export const rowName = ({ name, variant }) => `${name}-${variant}`.replaceAll(' ', '_');
+
+/** What benches/peers/orientation.py writes -> `[{ row, method, share, seconds }]`; a share that is no number: it failed. */
+export function readPeers(text) {
+  const [head, ...body] = text.trimEnd().split('\n');
+  if (head !== 'row\tmethod\tshare\tseconds')
+    throw new Error(`begins with "${head}"; wanted row, method, share, seconds`);
+  return body.map((line) => {
+    const [row, method, share, seconds] = line.split('\t');
+    return { row, method, share: Number(share), seconds: Number(seconds) };
+  });
+}
+
+function sources(rows, skipped, notes) {
+  const measured = new Map(rows.filter(({ kind }) => kind !== 'shape').map(({ name, about }) => [name, about]));
+  const texts = [...measured].map(([name, about]) => [name, [about, notes.get(name)].filter(Boolean).join('; ')]);
+  const credits = texts.filter(([, text]) => text).map(([name, text]) => `- ${name}: ${text}`);
+  const others = skipped.map(({ name, reason }) => `- ${name}: ${reason}`);
+  return paragraphs(
+    credits.length > 0 && 'The meshes and scans:',
+    credits.join('\n'),
+    others.length > 0 && 'Files of the folder that were not measured:',
+    others.join('\n'),
+  );
+}

@@ -1,0 +1,91 @@
+// The shapes of the orientation bench: those of the accuracy bench whose sides are known, and some that are hard to tell
+// the outside of. Samplers as there; normals point outwards.
+
+import { SHAPES as KNOWN } from '../accuracy/shapes.mjs';
+
+const TAU = 2 * Math.PI;
+const signed = (random) => 2 * random() - 1;
+
+/** The same points with normals to the other side. */
+export const turned = (sampler) => (random, out) => {
+  sampler(random, out);
+  for (let i = 3; i < 6; i++) out[i] = -out[i];
+};
+
+/** A closed box of 1 by 1 by 0.02, leaning over about the first axis: so its diagonal grows little, and with it the noise. */
+const thinBox = () => {
+  const [c, s] = [Math.cos(0.35), Math.sin(0.35)];
+  const half = [0.5, 0.5, 0.01];
+  const areas = half.map((_, axis) => half[(axis + 1) % 3] * half[(axis + 2) % 3]);
+  const total = areas.reduce((sum, area) => sum + area);
+  return (random, out) => {
+    let left = random() * total;
+    const axis = Math.max(
+      areas.findIndex((area) => (left -= area) < 0),
+      0,
+    );
+    const side = random() < 0.5 ? 1 : -1;
+    for (let i = 0; i < 3; i++) {
+      out[i] = i === axis ? side * half[i] : half[i] * signed(random);
+      out[3 + i] = i === axis ? side : 0;
+    }
+    for (const at of [1, 4]) {
+      const [y, z] = [out[at], out[at + 1]];
+      out[at] = c * y - s * z;
+      out[at + 1] = s * y + c * z;
+    }
+  };
+};
+
+const onSphere = (random, radius, [x, y, z], out) => {
+  const [height, a] = [signed(random), TAU * random()];
+  const ring = Math.sqrt(1 - height * height);
+  out.set([ring * Math.cos(a), ring * Math.sin(a), height], 3);
+  out.set([x + radius * out[3], y + radius * out[4], z + radius * out[5]]);
+};
+
+/** A sphere of radius 0.7 inside the unit sphere; both look away from the middle. */
+const nested = () => (random, out) => onSphere(random, random() < 1 / 1.49 ? 1 : 0.7, [0, 0, 0], out);
+
+/** Two unit spheres that touch, on a line about no special axis. */
+const touching = () => (random, out) => {
+  const side = random() < 0.5 ? 1 : -1;
+  onSphere(random, 1, [0.48 * side, 0.64 * side, 0.6 * side], out);
+};
+
+/** A Moebius band of radius 1 and width 0.8; its normals are those of one way round it. */
+const moebius = () => (random, out) => {
+  for (;;) {
+    const [u, t] = [TAU * random(), 0.4 * signed(random)];
+    const [c, s, half, rise] = [Math.cos(u), Math.sin(u), Math.cos(u / 2), Math.sin(u / 2)];
+    const r = 1 + t * half;
+    // The area of the surface above a piece of its parameters, at most 1.42.
+    const area = Math.hypot(r, t / 2);
+    if (1.42 * random() > area) continue;
+    out.set([r * c, r * s, t * rise]);
+    const lean = (t / 2) * s - r * rise * c;
+    const slant = (-t / 2) * c - r * rise * s;
+    out.set([lean / area, slant / area, (r * half) / area], 3);
+    return;
+  }
+};
+
+/**
+ * `open`: no side of it is the inside, and signs count up to one flip of all. `sides: false`: it has none. `noise`: the
+ * variant of its noisy row, 0.6 % but where that is more than the shape is thick.
+ */
+export const SHAPES = {
+  sphere: { shape: KNOWN.sphere },
+  cube: { shape: KNOWN.cube },
+  torus: { shape: KNOWN.torus },
+  cylinder: { shape: KNOWN.cylinder },
+  cone: { shape: KNOWN.cone },
+  thinbox: { shape: thinBox, noise: 'noise0.12' },
+  nested: { shape: nested },
+  touching: { shape: touching },
+  terrain: { shape: KNOWN.terrain, open: true },
+  // The tube of the accuracy bench, where signs do not count, looks inwards.
+  tube: { shape: (count) => turned(KNOWN.tube(count)), open: true },
+  room: { shape: KNOWN.room, open: true },
+  moebius: { shape: moebius, open: true, sides: false },
+};

@@ -1,0 +1,113 @@
+"""Signs by Open3D and MeshLib on the clouds of the orientation bench, for its --peers.
+
+    npm run orientation -- --meshes FOLDER --write CLOUDS
+    pip install open3d==0.20.0 meshlib==3.1.4.297
+    python benches/peers/orientation.py CLOUDS > peers.tsv
+    npm run orientation -- --meshes FOLDER --peers peers.tsv
+
+One line for each cloud and method: the share of right signs up to one flip of all, and the seconds on one thread, with
+the normals. Open3D estimates from 30 neighbours and orients along the tangent planes of 15 or 30 (Hoppe 1992); MeshLib
+does both within the radius that holds 48 or 150 points. What takes longer than LIMIT has the share "timeout". Names of
+clouds or methods after the folder choose some of them.
+"""
+
+import multiprocessing
+import os
+import sys
+import time
+
+os.environ["OMP_NUM_THREADS"] = "1"
+LIMIT = 90
+
+
+def open3d_normals(positions, neighbours):
+    import open3d
+
+    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(positions))
+    start = time.perf_counter()
+    cloud.estimate_normals(open3d.geometry.KDTreeSearchParamKNN(30))
+    cloud.orient_normals_consistent_tangent_plane(neighbours)
+    seconds = time.perf_counter() - start
+    return cloud.normals, seconds
+
+
+def meshlib_normals(positions, points):
+    from meshlib import mrmeshnumpy, mrmeshpy
+    import numpy
+
+    cloud = mrmeshnumpy.pointCloudFromPoints(positions, numpy.zeros((0, 3)))
+    start = time.perf_counter()
+    normals = mrmeshpy.makeOrientedNormals(cloud, mrmeshpy.findAvgPointsRadius(cloud, points))
+    seconds = time.perf_counter() - start
+    return [(normal.x, normal.y, normal.z) for normal in normals.vec], seconds
+
+
+METHODS = {
+    "open3d_15": (open3d_normals, 15),
+    "open3d_30": (open3d_normals, 30),
+    "meshlib_48": (meshlib_normals, 48),
+    "meshlib_150": (meshlib_normals, 150),
+}
+
+
+def read(path):
+    """Positions and true normals of a PLY file as --write leaves it: little endian, x y z nx ny nz as floats."""
+    import numpy
+
+    with open(path, "rb") as file:
+        header, body = file.read().split(b"end_header\n", 1)
+    properties = [line.split() for line in header.decode().splitlines() if line.startswith("property")]
+    if [words[1:] for words in properties] != [["float", name] for name in ("x", "y", "z", "nx", "ny", "nz")]:
+        raise SystemExit(f"{path}: wanted x y z nx ny nz as floats")
+    values = numpy.frombuffer(body, "<f4").reshape(-1, 6).astype(float)
+    return values[:, :3].copy(), values[:, 3:].copy()
+
+
+def judge(path, method, pipe):
+    import numpy
+
+    positions, truth = read(path)
+    choose, size = METHODS[method]
+    normals, seconds = choose(positions, size)
+    known = numpy.abs(truth).sum(1) > 0
+    along = (numpy.asarray(normals) * truth).sum(1)[known]
+    pipe.send((max((along > 0).mean(), (along < 0).mean()), seconds))
+
+
+def run(path, method):
+    """In a process of its own: both can take for ever, or more memory than there is."""
+    ours, theirs = multiprocessing.Pipe(False)
+    process = multiprocessing.Process(target=judge, args=(path, method, theirs))
+    process.start()
+    theirs.close()
+    try:
+        if not ours.poll(LIMIT):
+            return "timeout", f"{LIMIT}"
+        share, seconds = ours.recv()
+        return f"{share:.5f}", f"{seconds:.2f}"
+    except EOFError:
+        return "failed", "0"
+    finally:
+        process.terminate()
+        process.join()
+
+
+def main():
+    if len(sys.argv) < 2:
+        raise SystemExit("usage: orientation.py CLOUDS [ROW or METHOD]...")
+    folder, names = sys.argv[1], set(sys.argv[2:])
+    rows = sorted(name[:-4] for name in os.listdir(folder) if name.endswith(".ply"))
+    unknown = names - set(rows) - set(METHODS)
+    if unknown:
+        raise SystemExit(f"neither a cloud nor a method: {', '.join(sorted(unknown))}")
+    methods = [method for method in METHODS if method in names] or list(METHODS)
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    print("row\tmethod\tshare\tseconds", flush=True)
+    for row in [row for row in rows if row in names] or rows:
+        for method in methods:
+            print(row, method, *run(os.path.join(folder, f"{row}.ply"), method), sep="\t", flush=True)
+
+
+if __name__ == "__main__":
+    main()
