@@ -91,7 +91,7 @@ pub(super) fn signs(links: Links, own: Vec<f32>, span: f32, stage: &Stage) -> Re
 
 /// Groups that agree no better than this, for each patch along the side of a square of as many as the smaller has, only touch:
 /// they are surfaces of their own.
-const TOUCH: f32 = 0.03;
+const TOUCH: f32 = 0.1;
 
 /// How much more than by rights the second choice trusts what speaks for a sign by itself.
 const BOLDNESS: f32 = 3.0;

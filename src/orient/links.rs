@@ -35,7 +35,7 @@ impl Links {
     /// Links every patch to those in its cube and the 26 round it; `noise` is that of the points, in edges. One pass over the
     /// patches.
     pub fn of(grid: &Grid, patches: &Patches, noise: f32, stage: &Stage) -> Result<Self, Error> {
-        let sharpness = if noise < CLEAN { 15 } else { 5 };
+        let sharpness = if noise < CLEAN { 9 } else { 5 };
         let found = Gathering::new("the graph of patches");
         stage.run(grid.blocks.len(), &|block| {
             let mut surroundings = Surroundings::new();
@@ -95,7 +95,8 @@ impl Links {
 /// The first normal is reflected at the plane across the line between their centres: so the normals at both ends of an arc
 /// of a circle are each other's picture, also at a right-angled crease and on the two sides of a thin plate, where the
 /// normals alone say nothing, or the opposite (after Xie, McDonnell and Qin, "Surface reconstruction of noisy and defective
-/// data sets", 2004). What counts less: a line along the normals, and one that meets them at different angles, as on no arc.
+/// data sets", 2004). The less alike the picture, the more likely these are two sheets: hence the power. A line along the
+/// normals is no evidence, as noise of one surface and both sides of a wall look the same.
 #[inline(always)]
 fn evidence(a: &Patch, b: &Patch, step: Vec3, sharpness: i32) -> f32 {
     let line = step + b.centre - a.centre;
@@ -108,5 +109,5 @@ fn evidence(a: &Patch, b: &Patch, step: Vec3, sharpness: i32) -> f32 {
     let (x, y) = (line.dot(a.normal) / length, line.dot(b.normal) / length);
     let reflected = dot - 2.0 * (x * y);
     let (x, y) = (x.abs(), y.abs());
-    reflected.powi(sharpness) * (1.0 - x * y) * (1.0 - (x - y).abs()).powi(3)
+    reflected.powi(sharpness) * (1.0 - x * y)
 }
