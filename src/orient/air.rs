@@ -19,9 +19,9 @@ const HALF: f32 = 9.0;
 /// not, -1 where it is the other way round, 0 where neither does, or both.
 ///
 /// A patch looks into the open in a direction in which no voxel (a cube, or more in a large empty box) between its own and
-/// the end of the box is occupied. Each direction is one sweep over the bits of all voxels, 64 at a time. After the visibility votes of Takayama, Jacobson, Kavan and Sorkine-Hornung, "Consistently orienting
-/// facets in polygon meshes by minimizing the Dirichlet energy of generalized winding numbers" and its ray-shooting
-/// variant, 2014.
+/// the end of the box is occupied. Each direction is one sweep over the bits of all voxels, 64 at a time. After the votes on
+/// facets of Takayama, Jacobson, Kavan and Sorkine-Hornung, "A simple method for correcting facet orientations in polygon
+/// meshes based on ray casting", 2014.
 pub(super) fn exposure(grid: &Grid, patches: &Patches, points: usize, stage: &Stage) -> Result<Vec<f32>, Error> {
     let voxels = Voxels::of(grid, points)?;
     let mut seen: Vec<AtomicU32> = Vec::new();

@@ -70,8 +70,8 @@ const LEAST_CONFIDENCE: f64 = 0.2;
 
 /// Turns the normals of all points as `orient` asks; answers for surfaces what was decided for each, the largest first.
 ///
-/// Towards a position or a direction: one pass over the points. Otherwise linear in the points, and some 60 bytes for each
-/// on a clean surface.
+/// Towards a position or a direction: one pass over the points. Otherwise linear in the points; besides these and the normals
+/// some 35 bytes for each on smooth surfaces, up to 130 in vegetation.
 pub(crate) fn orient(
     points: &Points,
     normals: &mut [Vec3],
