@@ -83,6 +83,14 @@ pub(crate) fn reserve<T>(items: &mut Vec<T>, count: usize, what: &str) -> Result
     items.try_reserve_exact(count).map_err(|_| Error::memory(what, needed))
 }
 
+/// A list of `count` times the same, or how much memory was needed.
+pub(crate) fn filled<T: Clone>(value: T, count: usize, what: &str) -> Result<Vec<T>, Error> {
+    let mut items = Vec::new();
+    reserve(&mut items, count, what)?;
+    items.resize(count, value);
+    Ok(items)
+}
+
 /// The box round all finite points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Bounds {

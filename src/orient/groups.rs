@@ -2,8 +2,11 @@
 
 use super::links::{Link, Links};
 use crate::error::Error;
-use crate::points::reserve;
+use crate::points::{filled, reserve};
 use crate::progress::Stage;
+
+/// What errors call the memory of all this.
+const WHAT: &str = "the graph of patches";
 
 /// The signs of all patches, and which of them hang together.
 pub(super) struct Signs {
@@ -39,13 +42,14 @@ struct Level {
 pub(super) fn signs(links: Links, own: Vec<f32>, span: f32, stage: &Stage) -> Result<Signs, Error> {
     let patches = links.len();
     let mut levels = Vec::new();
-    let (mut links, mut own, mut sizes) = (links, own, vec![1; patches]);
-    let mut component: Vec<u32> = (0..patches as u32).collect();
+    let (mut links, mut own, mut sizes) = (links, own, filled(1, patches, WHAT)?);
+    let mut component = filled(0u32, patches, WHAT)?;
+    component.iter_mut().zip(0..).for_each(|(component, one)| *component = one);
     let mut count = patches;
     stage.tell(0.0)?;
-    while let Some((group, flipped, groups)) = merge(&links, &sizes) {
+    while let Some(Merging { group, flipped, groups }) = merge(&links, &sizes)? {
         let (merged, sums) = gather(&links, &own, &group, &flipped, groups)?;
-        let mut counts = vec![0; groups];
+        let mut counts = filled(0, groups, WHAT)?;
         group.iter().zip(&sizes).for_each(|(&group, &size)| counts[group as usize] += size);
         component.iter_mut().for_each(|component| *component = group[*component as usize]);
         levels.push(Level {
@@ -59,22 +63,27 @@ pub(super) fn signs(links: Links, own: Vec<f32>, span: f32, stage: &Stage) -> Re
         stage.tell(0.7 * (1.0 - count as f64 / patches as f64))?;
     }
     // From the last level to the first; `trust` is the weight of what speaks for a sign by itself.
-    let descend = |trust: f32| {
-        let mut flipped: Vec<bool> = own.iter().map(|own| *own < 0.0).collect();
+    let descend = |trust: f32| -> Result<Vec<bool>, Error> {
+        let mut flipped = filled(false, own.len(), WHAT)?;
+        flipped.iter_mut().zip(&own).for_each(|(flipped, own)| *flipped = *own < 0.0);
         for Level { links, own, sizes, group, flipped: within } in levels.iter().rev() {
-            flipped = group.iter().zip(within).map(|(&group, within)| within ^ flipped[group as usize]).collect();
-            let share = |(own, &size): (&f32, &u32)| trust * own * (span / size as f32).sqrt().min(1.0);
-            mend(links, &own.iter().zip(sizes).map(share).collect::<Vec<f32>>(), &mut flipped);
+            let mut finer = filled(false, group.len(), WHAT)?;
+            for ((finer, &group), within) in finer.iter_mut().zip(group).zip(within) {
+                *finer = within ^ flipped[group as usize];
+            }
+            flipped = finer;
+            let share = |one: usize| trust * own[one] * (span / sizes[one] as f32).sqrt().min(1.0);
+            mend(links, &share, &mut flipped)?;
         }
-        flipped
+        Ok(flipped)
     };
-    let mut flipped = descend(1.0);
+    let mut flipped = descend(1.0)?;
     if let Some(Level { links, own, .. }) = levels.first() {
         // Flipping one small group after the other does not reach a far better choice behind worse ones, as where both
         // sides of a thin noisy wall were taken for one.
         stage.tell(0.8)?;
-        let bold = descend(BOLDNESS);
-        let mut gains = vec![0.0; count];
+        let bold = descend(BOLDNESS)?;
+        let mut gains = filled(0.0, count, WHAT)?;
         for (one, &component) in component.iter().enumerate() {
             gains[component as usize] += score(links, own, &bold, one) - score(links, own, &flipped, one);
         }
@@ -83,7 +92,7 @@ pub(super) fn signs(links: Links, own: Vec<f32>, span: f32, stage: &Stage) -> Re
                 *flipped = bold;
             }
         }
-        mend(links, own, &mut flipped);
+        mend(links, &|one| own[one], &mut flipped)?;
     }
     stage.tell(1.0)?;
     Ok(Signs { flipped, component, components: count })
@@ -111,13 +120,23 @@ fn score(links: &Links, own: &[f32], flipped: &[bool], one: usize) -> f64 {
     f64::from(support(links, flipped, one)) / 2.0 + f64::from(signed(flipped[one], own[one]))
 }
 
-/// The group of each, and whether it is flipped against the group's first; and how many groups. `None` when no two are
-/// linked any more.
+/// Which groups become one.
+struct Merging {
+    /// For each its new group.
+    group: Vec<u32>,
+    /// Whether it is flipped against the first of that.
+    flipped: Vec<bool>,
+    /// How many new ones there are.
+    groups: usize,
+}
+
+/// Merges each with the one that it has the strongest evidence for or against. `None` when no two are linked any more.
 #[inline(never)]
-fn merge(links: &Links, sizes: &[u32]) -> Option<(Vec<u32>, Vec<bool>, usize)> {
+fn merge(links: &Links, sizes: &[u32]) -> Result<Option<Merging>, Error> {
     let count = links.len();
     // Towards the root of the group, and whether flipped against it.
-    let mut parents: Vec<(u32, bool)> = (0..count as u32).map(|one| (one, false)).collect();
+    let mut parents = filled((0u32, false), count, WHAT)?;
+    parents.iter_mut().zip(0..).for_each(|(parent, one)| parent.0 = one);
     let mut is_merged = false;
     for one in 0..count {
         let mut best = Link { to: 0, evidence: 0.0 };
@@ -138,9 +157,9 @@ fn merge(links: &Links, sizes: &[u32]) -> Option<(Vec<u32>, Vec<bool>, usize)> {
         }
     }
     if !is_merged {
-        return None;
+        return Ok(None);
     }
-    let (mut group, mut flipped) = (vec![0; count], vec![false; count]);
+    let (mut group, mut flipped) = (filled(0, count, WHAT)?, filled(false, count, WHAT)?);
     let mut groups = 0;
     for one in 0..count {
         let (root, is_flipped) = root(&mut parents, one as u32);
@@ -149,7 +168,7 @@ fn merge(links: &Links, sizes: &[u32]) -> Option<(Vec<u32>, Vec<bool>, usize)> {
         groups += u32::from(root as usize == one);
         flipped[one] = is_flipped;
     }
-    Some((group, flipped, groups as usize))
+    Ok(Some(Merging { group, flipped, groups: groups as usize }))
 }
 
 /// The root of one, and whether it is flipped against that; halves the way there.
@@ -178,12 +197,9 @@ fn gather(
     flipped: &[bool],
     groups: usize,
 ) -> Result<(Links, Vec<f32>), Error> {
-    const WHAT: &str = "the graph of patches";
-    let mut sums = Vec::new();
-    reserve(&mut sums, groups, WHAT)?;
-    sums.resize(groups, 0.0);
+    let mut sums = filled(0.0, groups, WHAT)?;
     // The members of each group, one after the other.
-    let mut ends = vec![0u32; groups + 1];
+    let mut ends = filled(0u32, groups + 1, WHAT)?;
     for (one, &group) in group.iter().enumerate() {
         sums[group as usize] += if flipped[one] { -own[one] } else { own[one] };
         ends[group as usize + 1] += 1;
@@ -192,16 +208,18 @@ fn gather(
         ends[i + 1] += ends[i];
     }
     let mut next = ends.clone();
-    let mut members = vec![0u32; group.len()];
+    let mut members = filled(0u32, group.len(), WHAT)?;
     for (one, &group) in group.iter().enumerate() {
         members[next[group as usize] as usize] = one as u32;
         next[group as usize] += 1;
     }
     let mut merged = Links::default();
+    // No more than there were, and seldom much fewer than half.
+    reserve(&mut merged.all, links.all.len() / 2, WHAT)?;
     reserve(&mut merged.first, groups + 1, WHAT)?;
     merged.first.push(0);
     // Where the link to a group stands; none before the own start.
-    let mut places = vec![u32::MAX; groups];
+    let mut places = filled(u32::MAX, groups, WHAT)?;
     for one in 0..groups {
         let start = merged.all.len();
         for &member in &members[ends[one] as usize..ends[one + 1] as usize] {
@@ -228,19 +246,19 @@ fn gather(
 
 /// Flips what gains by it, until nothing does; each flip raises the sum of all evidence.
 #[inline(never)]
-fn mend(links: &Links, own: &[f32], flipped: &mut [bool]) {
+fn mend(links: &Links, own: &dyn Fn(usize) -> f32, flipped: &mut [bool]) -> Result<(), Error> {
     const ROUNDS: usize = 16;
     /// Less is rounding.
     const LEAST: f32 = 1e-6;
     // Whose neighbours changed since it was asked.
-    let mut is_stirred = vec![true; flipped.len()];
+    let mut is_stirred = filled(true, flipped.len(), WHAT)?;
     for _ in 0..ROUNDS {
         let mut any = false;
         for one in 0..flipped.len() {
             if !std::mem::take(&mut is_stirred[one]) {
                 continue;
             }
-            if support(links, flipped, one) + signed(flipped[one], own[one]) < -LEAST {
+            if support(links, flipped, one) + signed(flipped[one], own(one)) < -LEAST {
                 flipped[one] = !flipped[one];
                 any = true;
                 links.from(one).iter().for_each(|link| is_stirred[link.to as usize] = true);
@@ -250,4 +268,5 @@ fn mend(links: &Links, own: &[f32], flipped: &mut [bool]) {
             break;
         }
     }
+    Ok(())
 }

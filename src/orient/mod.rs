@@ -9,13 +9,14 @@ mod groups;
 mod links;
 mod patches;
 
+use crate::bricks::set_bits;
 use crate::cell;
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::lattice::{CUBES, Lattice, cube_centre};
 use crate::options::Orient;
 use crate::parallel::{self, Scatter};
-use crate::points::{Bounds, Bulk, CHUNK, Points};
+use crate::points::{Bounds, Bulk, CHUNK, Points, filled, reserve};
 use crate::progress::Stage;
 use glam::{DVec3, Vec3};
 use groups::Signs;
@@ -124,7 +125,7 @@ fn surfaces(
     let exposure = air::exposure(&grid, &patches, points.len(), &stage.part(0.5..0.55))?;
     let links = Links::of(&grid, &patches, noise, &stage.part(0.55..0.7))?;
     let mut signs = groups::signs(links, exposure.clone(), span, &stage.part(0.7..0.95))?;
-    let components = decide(&grid, &patches, &exposure, &mut signs);
+    let components = decide(&grid, &patches, &exposure, &mut signs)?;
     turn(&grid, &patches, &signs.flipped, normals, &stage.part(0.95..1.0))?;
     Ok(components)
 }
@@ -158,17 +159,20 @@ struct Sums {
     flux: f64,
     exposure: f64,
     all_exposure: f64,
+    /// The sum of distances from the middle.
     reach: f64,
+    /// Whether the component faces inwards.
+    is_turned: bool,
 }
 
 /// Turns the components that face inwards, and tells how sure that is; those without an inside away from their middle.
-fn decide(grid: &Grid, patches: &Patches, exposure: &[f32], signs: &mut Signs) -> Vec<Component> {
-    let mut all = vec![Sums::default(); signs.components];
+fn decide(grid: &Grid, patches: &Patches, exposure: &[f32], signs: &mut Signs) -> Result<Vec<Component>, Error> {
+    let mut all = filled(Sums::default(), signs.components, "the components")?;
     let places = || {
         (0..grid.bricks.len()).flat_map(|brick| {
             let corner = 4.0 * grid.bricks.places[brick].as_dvec3();
             let cubes = grid.first_cube[brick] as usize..grid.first_cube[brick + 1] as usize;
-            cubes.zip(crate::bricks::set_bits(grid.masks[brick])).flat_map(move |(cube, bit)| {
+            cubes.zip(set_bits(grid.masks[brick])).flat_map(move |(cube, bit)| {
                 let centre = corner + cube_centre(bit).as_dvec3();
                 (patches.first[cube] as usize..patches.first[cube + 1] as usize)
                     .map(move |i| (i, centre + patches.all[i].centre.as_dvec3()))
@@ -191,23 +195,21 @@ fn decide(grid: &Grid, patches: &Patches, exposure: &[f32], signs: &mut Signs) -
         sums.reach += f64::from(patches.all[i].points) * place.distance(sums.place / sums.points as f64);
     }
     let share = |part: f64, all: f64| if all > 0.0 { part / all } else { 0.0 };
-    let (components, turned): (Vec<Component>, Vec<bool>) = all
-        .iter()
-        .map(|sums| {
-            let points = sums.points;
-            let air = share(sums.exposure, sums.all_exposure);
-            let volume = share(sums.flux - sums.place.dot(sums.normal) / points as f64, sums.reach);
-            let (side, evidence) =
-                if air.abs() >= LEAST_CONFIDENCE { (Side::Air, air) } else { (Side::Volume, volume) };
-            (Component { points, side, confidence: evidence.abs().min(1.0) }, evidence < 0.0)
-        })
-        .unzip();
-    for (flipped, &component) in signs.flipped.iter_mut().zip(&signs.component) {
-        *flipped ^= turned[component as usize];
+    let mut components = Vec::new();
+    reserve(&mut components, all.len(), "the components")?;
+    for sums in &mut all {
+        let points = sums.points;
+        let air = share(sums.exposure, sums.all_exposure);
+        let volume = share(sums.flux - sums.place.dot(sums.normal) / points as f64, sums.reach);
+        let (side, evidence) = if air.abs() >= LEAST_CONFIDENCE { (Side::Air, air) } else { (Side::Volume, volume) };
+        components.push(Component { points, side, confidence: evidence.abs().min(1.0) });
+        sums.is_turned = evidence < 0.0;
     }
-    let mut components = components;
+    for (flipped, &component) in signs.flipped.iter_mut().zip(&signs.component) {
+        *flipped ^= all[component as usize].is_turned;
+    }
     components.sort_by_key(|component| std::cmp::Reverse(component.points));
-    components
+    Ok(components)
 }
 
 /// Gives every point the sign of its patch.
