@@ -98,7 +98,7 @@ describe('the small run', () => {
   test('a claim that fails reads as failing', () => {
     const worse = structuredClone(rows);
     worse.spheres[0].methods['1.0 L'].error.mean = 0.01;
-    for (const { methods } of worse.spheres) methods.egg.module = methods['1.0 L'].module;
+    for (const { methods } of worse.spheres) methods.egg.rounds = methods['1.0 L'].rounds;
     const facts = { machine: {}, minutes: 1, skipped: [], hasFolder: true };
     const [before, after] = [rows, worse].map((rows) => report(rows, facts).match(/does not hold/g).length);
     assert.ok(after > before, `${after} after ${before}`);
