@@ -94,6 +94,12 @@ impl Grid {
         self.cube_end.len()
     }
 
+    /// Where the points of a cube stand among all points of the grid.
+    pub fn points_of(&self, cube: usize) -> Range<usize> {
+        let start = if cube == 0 { 0 } else { self.cube_end[cube - 1] };
+        start as usize..self.cube_end[cube] as usize
+    }
+
     /// Calls `work(brick, cube, its bit in the mask)` for every cube, in parallel.
     pub fn each_cube(&self, stage: &Stage, work: &(dyn Fn(usize, usize, u32) + Sync)) -> Result<(), Error> {
         stage

@@ -1,7 +1,7 @@
 //! From a position to its cube, and back.
 
 use crate::points::Bounds;
-use glam::{DVec3, IVec3, UVec3, Vec3, Vec4, Vec4Swizzles};
+use glam::{DVec3, IVec3, Vec3, Vec4, Vec4Swizzles};
 
 /// Cubes along the edge of a brick.
 pub(crate) const BRICK: i32 = 4;
@@ -124,10 +124,16 @@ pub(crate) fn octant_in_brick(place: Vec4) -> u32 {
     octant.xyz().element_sum() as u32
 }
 
-/// The centre of the cube with bit `bit`, in the brick.
+/// The place of the cube with bit `bit`, in the brick.
+#[inline(always)]
+pub(crate) fn cube_place(bit: u32) -> IVec3 {
+    IVec3::new((bit & 3) as i32, (bit >> 2 & 3) as i32, (bit >> 4) as i32)
+}
+
+/// Its centre.
 #[inline]
 pub(crate) fn cube_centre(bit: u32) -> Vec3 {
-    UVec3::new(bit & 3, bit >> 2 & 3, bit >> 4).as_vec3() + 0.5
+    cube_place(bit).as_vec3() + 0.5
 }
 
 #[cfg(test)]

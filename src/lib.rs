@@ -6,8 +6,8 @@
 //! Normal Vector" ("the paper").
 //!
 //! ```text
-//! file bytes -> points -> grid -> nodes or surfaces -> normals
-//!     ply       points    grid    nodes, adaptive      normals
+//! file bytes -> points -> grid -> nodes or surfaces -> normals -> signs
+//!     ply       points    grid    nodes, adaptive      normals   orient
 //! ```
 #![warn(missing_docs)]
 // What runs once in a call is compiled for size: the modules that browsers download must stay small.
@@ -22,6 +22,7 @@ mod error;
 mod estimate;
 mod grid;
 mod lattice;
+mod median;
 mod nodes;
 mod normals;
 mod number;
@@ -40,6 +41,6 @@ pub mod wasm;
 pub use error::{Error, Place};
 pub use estimate::{Estimate, Report, Scale, estimate};
 pub use options::{Cell, Method, Options, Orient};
-pub use orient::{Component, Side};
+pub use orient::{Component, Components, Side};
 pub use points::Points;
 pub use progress::Progress;

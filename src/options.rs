@@ -17,6 +17,9 @@ pub struct Options {
     pub orient: Orient,
     /// Whether to return the surface variation of every point too ([`crate::Estimate::curvature`]). Default: no.
     pub curvature: bool,
+    /// Whether to return which surface every point belongs to ([`crate::Estimate::components`]), with
+    /// [`Orient::Consistent`] or [`Orient::Outward`]. Default: no.
+    pub components: bool,
 }
 
 /// Fewer points determine no plane.
@@ -98,6 +101,11 @@ impl Options {
             let [x, y, z] = [x, y, z].map(text);
             Err(Error::Input(format!("orient.{name} is {x}, {y}, {z}; wanted {wanted}")))
         };
+        if self.components && !matches!(self.orient, Orient::Consistent | Orient::Outward) {
+            return Err(Error::Input(
+                "components are those of orient 'consistent' or 'outward'; wanted one of them".into(),
+            ));
+        }
         match self.orient {
             Orient::Viewpoint(viewpoint) if !viewpoint.iter().all(|x| x.is_finite()) => {
                 vector("viewpoint", viewpoint, "three finite numbers")

@@ -98,6 +98,16 @@ impl<T> Gathering<T> {
     }
 }
 
+/// The items of all lists, one list after the other; or the memory that it lacked.
+pub(crate) fn concatenated<T>(lists: Vec<Vec<T>>, what: &str) -> Result<Vec<T>, Error> {
+    let mut all = Vec::new();
+    reserve(&mut all, lists.iter().map(Vec::len).sum(), what)?;
+    for mut list in lists {
+        all.append(&mut list);
+    }
+    Ok(all)
+}
+
 /// A list that tasks fill, each item once and in any order. Not zeroed before: that would be a pass over the memory by
 /// one thread, a tenth of the time of an estimate.
 pub(crate) struct Filling<T> {

@@ -91,6 +91,27 @@ pub(crate) fn filled<T: Clone>(value: T, count: usize, what: &str) -> Result<Vec
     Ok(items)
 }
 
+/// Where each of some runs starts, from their lengths; one more at the end.
+pub(crate) fn starts(lengths: &[u32], what: &str) -> Result<Vec<usize>, Error> {
+    let mut starts = Vec::new();
+    reserve(&mut starts, lengths.len() + 1, what)?;
+    let mut total = 0;
+    starts.push(0);
+    starts.extend(lengths.iter().map(|&length| {
+        total += length as usize;
+        total
+    }));
+    Ok(starts)
+}
+
+/// Numbers below `count`, one from each of at most `most` strides of one length. A different place in each, so that the rows
+/// of a scan do not fall in step with them.
+pub(crate) fn spread(count: usize, most: usize) -> impl Iterator<Item = usize> {
+    let step = count.div_ceil(most).max(1);
+    let place = move |i: usize| i * step + (i as u32).wrapping_mul(0x9E37_79B9) as usize % step;
+    (0..count.div_ceil(step)).map(move |i| place(i).min(count - 1))
+}
+
 /// The box round all finite points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Bounds {
@@ -177,10 +198,7 @@ impl Bulk {
     /// Looks at `at(0) .. at(count - 1)`, at most a few thousand of them; non-finite points are passed over.
     #[optimize(size)]
     pub fn of(count: usize, at: &dyn Fn(usize) -> DVec3) -> Self {
-        let step = count.div_ceil(SAMPLE).max(1);
-        // A different place in each stride, so that the rows of a scan do not fall in step with the sample.
-        let place = |i: usize| (i * step + (i as u32).wrapping_mul(0x9E37_79B9) as usize % step).min(count - 1);
-        let sample: Vec<DVec3> = (0..count.div_ceil(step)).map(|i| at(place(i))).filter(|p| p.is_finite()).collect();
+        let sample: Vec<DVec3> = spread(count, SAMPLE).map(at).filter(|p| p.is_finite()).collect();
         let mut bulk = Self { median: DVec3::ZERO, extent: 0.0, sample };
         if bulk.sample.is_empty() {
             return bulk;

@@ -1,7 +1,7 @@
 //! How a long call tells where it is, and how its caller stops it.
 
 use crate::error::Error;
-use crate::parallel;
+use crate::parallel::{self, Gathering};
 use std::ops::{ControlFlow, Range};
 
 type Observer<'a> = dyn Fn(&'static str, f64) -> ControlFlow<()> + 'a;
@@ -31,7 +31,7 @@ impl<'a> Progress<'a> {
 
     /// The same for a call of which all that comes is the first `share`.
     pub(crate) fn first(&self, share: f64) -> Self {
-        Self { share, ..*self }
+        Self { share: self.share * share, ..*self }
     }
 
     /// The part of the call that goes from `share.start` to `share.end` of the whole.
@@ -64,7 +64,12 @@ impl Stage<'_> {
     /// the call: with tasks of some ten thousand points, some twenty times a second. Threads wait for each other
     /// at the end of a batch, so smaller ones cost time.
     pub fn run(&self, count: usize, work: &(dyn Fn(usize) + Sync)) -> Result<(), Error> {
-        let batch = 64 * parallel::threads();
+        self.run_in(64, count, work)
+    }
+
+    /// The same for long tasks: `each` of them a thread between two looks at the observer.
+    pub fn run_in(&self, each: usize, count: usize, work: &(dyn Fn(usize) + Sync)) -> Result<(), Error> {
+        let batch = each * parallel::threads();
         let mut done = 0;
         while done < count {
             self.tell(done as f64 / count as f64)?;
@@ -73,6 +78,20 @@ impl Stage<'_> {
             done += length;
         }
         self.tell(1.0)
+    }
+
+    /// The same, with what `work` finds for each number, in their order.
+    pub fn collect<T: Send>(
+        &self,
+        count: usize,
+        what: &'static str,
+        work: &(dyn Fn(usize) -> T + Sync),
+    ) -> Result<Vec<T>, Error> {
+        let found = Gathering::new(what);
+        self.run(count, &|i| found.append(vec![(i, work(i))]))?;
+        let mut found = found.all()?;
+        found.sort_unstable_by_key(|&(i, _)| i);
+        Ok(found.into_iter().map(|(_, found)| found).collect())
     }
 
     /// Tells the observer that `fraction` of this part is done, and lets it stop the call.

@@ -131,7 +131,7 @@ const fn near_bit(step: IVec3) -> u32 {
 }
 
 /// The 27 steps from a cube to itself and its neighbours, x fastest.
-const STEPS: [IVec3; 27] = {
+pub(crate) const STEPS: [IVec3; 27] = {
     let mut steps = [IVec3::ZERO; 27];
     let mut i = 0;
     while i < 27 {

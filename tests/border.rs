@@ -132,6 +132,39 @@ fn the_report_has_every_field_of_the_contract() {
 }
 
 #[wasm_bindgen_test]
+fn signs_are_as_asked_for() {
+    let sphere = sphere();
+    let outwards = |text: &str| {
+        let normals = normals_of(estimate(floats(&single(&sphere)), false, &options(text), &nobody()).unwrap());
+        let dots = normals.iter().zip(&sphere).map(|(n, p)| f64::from(*n) * p).collect::<Vec<_>>();
+        dots.chunks(3).filter(|dot| dot.iter().sum::<f64>() > 0.0).count()
+    };
+    assert_eq!(outwards(r#"{ "orient": "outward" }"#), POINTS);
+    assert_eq!(outwards(r#"{ "orient": { "viewpoint": [0, 0, 0] } }"#), 0);
+    let up = options(r#"{ "orient": { "up": [0, -1, 0] } }"#);
+    let normals = normals_of(estimate(floats(&single(&sphere)), false, &up, &nobody()).unwrap());
+    assert!(normals.chunks(3).all(|n| n[1] <= 0.0));
+}
+
+#[wasm_bindgen_test]
+fn surfaces_are_told_of_and_numbered() {
+    let points: Vec<f32> = single(&sphere()).into_iter().chain([f32::NAN; 3]).collect();
+    let asked = options(r#"{ "orient": "consistent", "components": true }"#);
+    let estimation = estimate(floats(&points), false, &asked, &nobody()).unwrap();
+    let numbers: Vec<u32> = numbers(&buffer(&estimation, "components")).iter().map(|n| n.to_bits()).collect();
+    assert_eq!(numbers, [vec![0; POINTS], vec![u32::MAX]].concat());
+    let components = get(&get(&estimation, "report"), "components");
+    assert_eq!(number(&components, "count"), 1.0);
+    let largest = Array::from(&get(&components, "largest")).get(0);
+    assert_eq!((number(&largest, "points"), get(&largest, "side")), (POINTS as f64, JsValue::from("air")));
+    assert!(number(&largest, "confidence") > 0.8);
+    for refused in [r#"{ "components": true }"#, r#"{ "components": true, "orient": { "up": [0, 0, 1] } }"#] {
+        let (code, message) = thrown(estimate(floats(&points), false, &options(refused), &nobody()));
+        assert!(code == "input" && message.contains("'consistent' or 'outward'"), "{code}: {message}");
+    }
+}
+
+#[wasm_bindgen_test]
 fn the_report_of_the_automatic_cell_tells_noise_and_scales() {
     let report = |points: &[f32]| get(&estimate(floats(points), false, &options("{}"), &nobody()).unwrap(), "report");
     let sphere = report(&single(&sphere()));

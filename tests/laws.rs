@@ -187,7 +187,14 @@ fn the_same_bits_for_any_number_of_threads() {
         (with_spoilt(100_000), baselines(&[None])),
         (
             cube(200_000, 22).noisy(0.006, 23).points,
-            vec![Options { orient: Orient::Consistent, cell: Cell::Scale(1.0), ..Options::default() }],
+            [Orient::Consistent, Orient::Outward, Orient::Viewpoint([3.0, 1.0, 2.0]), Orient::Up([0.0, 1.0, 0.0])]
+                .map(|orient| Options {
+                    orient,
+                    cell: Cell::Scale(1.0),
+                    components: matches!(orient, Orient::Consistent | Orient::Outward),
+                    ..Options::default()
+                })
+                .to_vec(),
         ),
     ] {
         let strayed = [points.clone(), vec![1e9, 1e9, 1e9]].concat();

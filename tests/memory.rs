@@ -3,7 +3,7 @@
 
 mod common;
 
-use bilinormal::Cell;
+use bilinormal::{Cell, Options, Orient, Points};
 use common::*;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -42,20 +42,25 @@ fn peak_bytes_a_point() {
         .map(|i| if i % 3 == 0 { 1e6 * random.signed() as f32 } else { random.signed() as f32 })
         .collect();
     // Input and normals are 12 bytes each.
-    for (name, points, cell, bound) in [
-        ("sphere, 1.5 L", &sphere, Cell::Scale(1.5), 48),
-        ("sphere, 1.0 L", &sphere, Cell::Scale(1.0), 48),
-        ("sphere, auto", &sphere, Cell::Auto, 52),
-        ("a stray point", &stray(3e6), Cell::Auto, 52),
-        ("a stray point beyond all cubes", &stray(-1e30), Cell::Auto, 52),
-        ("rough everywhere", &noisy, Cell::Auto, 105),
-        ("a needle", &needle, Cell::Scale(1.0), 90),
-        ("as many cubes as points", &sphere, Cell::Scale(0.1), 110),
-        ("far more cubes than points", &sphere, Cell::Size(1e-6), 150),
+    let (none, consistent) = (Orient::None, Orient::Consistent);
+    for (name, points, cell, orient, bound) in [
+        ("sphere, 1.5 L", &sphere, Cell::Scale(1.5), none, 48),
+        ("sphere, 1.0 L", &sphere, Cell::Scale(1.0), none, 48),
+        ("sphere, auto", &sphere, Cell::Auto, none, 52),
+        ("a stray point", &stray(3e6), Cell::Auto, none, 52),
+        ("a stray point beyond all cubes", &stray(-1e30), Cell::Auto, none, 52),
+        ("rough everywhere", &noisy, Cell::Auto, none, 105),
+        ("a needle", &needle, Cell::Scale(1.0), none, 90),
+        ("as many cubes as points", &sphere, Cell::Scale(0.1), none, 110),
+        ("far more cubes than points", &sphere, Cell::Size(1e-6), none, 150),
+        ("signs on a sphere", &sphere, Cell::Scale(1.5), consistent, 60),
+        ("signs with a stray point", &stray(3e6), Cell::Scale(1.5), consistent, 60),
+        ("signs in a solid, where patches are many", &noisy, Cell::Scale(1.5), consistent, 215),
     ] {
         let before = CURRENT.load(Relaxed);
         PEAK.store(before, Relaxed);
-        let result = run(points, cell);
+        let options = Options { cell, orient, ..Options::default() };
+        let result = run_with(&Points::from_f32(points).unwrap(), &options);
         let peak = PEAK.load(Relaxed) - before + 4 * points.len();
         let each = peak / (points.len() / 3);
         println!("{name}: {each} bytes a point, {} cubes", result.report.cells);

@@ -124,7 +124,7 @@ export async function measureAll(estimator, rows, { tell }) {
         signs.thin = rightSigns(normals, truth, (i) => thick[i] === 0);
       }
       const { components } = report;
-      modes[mode] = { signs, components: components.length, largest: components[0], seconds };
+      modes[mode] = { signs, components: components.count, largest: components.largest[0], seconds };
     }
     results.push({ ...row, points: positions.length / 3, modes });
   }

@@ -15,6 +15,7 @@ mod vote;
 
 use crate::error::Error;
 use crate::lattice::{self, Lattice};
+use crate::median::median;
 use crate::normals::{Found, Normals};
 use crate::points::{Points, reserve};
 use crate::progress::{Progress, Stage};
@@ -22,7 +23,7 @@ use choose::{Chosen, choose};
 use glam::{IVec3, Vec3};
 use level::Level;
 use std::ops::Range;
-use vote::{Vote, median};
+use vote::Vote;
 
 /// Normals, and what was decided.
 pub(crate) struct Adaptive {

@@ -288,13 +288,13 @@ function format(report: Report, { method = 'bilinear' }: EstimateOptions): strin
 }
 
 /** The largest of the surfaces that were given one sign each; all of many would not fit a screen. */
-function surfaces(components: Report['components'] = []): [string, string][] {
-  const shown = components.slice(0, 4).map(({ points, side, confidence }) => {
-    const sure = `${Math.round(100 * confidence)} % sure`;
-    return `${points.toLocaleString('en')} points ${side === 'air' ? 'outwards' : 'away from the middle'}, ${sure}`;
+function surfaces({ count, largest }: Report['components'] = { count: 0, largest: [] }): [string, string][] {
+  const ways = { air: 'outwards', volume: 'away from the middle', convention: 'to a side by convention' };
+  const shown = largest.slice(0, 4).map(({ points, side, confidence }) => {
+    const sure = side === 'convention' ? '' : `, ${Math.round(100 * confidence)} % sure`;
+    return `${points.toLocaleString('en')} points ${ways[side]}${sure}`;
   });
-  if (components.length > shown.length)
-    shown.push(`${(components.length - shown.length).toLocaleString('en')} smaller`);
+  if (count > shown.length) shown.push(`${(count - shown.length).toLocaleString('en')} smaller`);
   return shown.map((text, i) => [i === 0 ? 'surfaces' : '', text]);
 }
 

@@ -173,8 +173,8 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
 }
 
 /** Whether the core suffices, which knows no other method and no other cells. What is misspelt the full module refuses. */
-function isPlain({ method = 'bilinear', cell = 'auto', k, orient = 'none' }: EstimateOptions) {
-  return method === 'bilinear' && cell === 'auto' && k === undefined && orient === 'none';
+function isPlain({ method = 'bilinear', cell = 'auto', k, orient = 'none', components }: EstimateOptions) {
+  return method === 'bilinear' && cell === 'auto' && k === undefined && orient === 'none' && !components;
 }
 
 /** An estimator that starts a worker when a call needs one, and a call that does no more than that. */

@@ -91,10 +91,11 @@ async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Plat
       const positions = put(call.positions);
       // Not kept in JavaScript memory meanwhile: 12 or 24 bytes a point.
       delete (call as Partial<typeof call>).positions;
-      const { normals, curvature, report } = glue.estimate(positions, call.double, call.options, tell);
+      const { normals, curvature, components, report } = glue.estimate(positions, call.double, call.options, tell);
       return {
         normals: new Float32Array(take(normals)),
         ...(curvature && { curvature: new Float32Array(take(curvature)) }),
+        ...(components && { components: new Uint32Array(take(components)) }),
         report: { ...report, ...mode },
       };
     }

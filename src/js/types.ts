@@ -42,6 +42,8 @@ export interface EstimateOptions {
     'none' | 'consistent' | 'outward' | { viewpoint: [number, number, number] } | { up: [number, number, number] };
   /** Also return `curvature`, 4 bytes a point. Default false. */
   curvature?: boolean;
+  /** Also return `components`, 4 bytes a point, with `orient: 'consistent'` or `'outward'`. Default false. */
+  components?: boolean;
   /**
    * Default false: the positions are copied when the call is made. True: their buffer is handed over and detached.
    * A view of a part of a buffer, or of shared memory, is copied all the same: the rest is not the call's to take.
@@ -64,6 +66,11 @@ export interface EstimateResult {
    * nearest points.
    */
   curvature?: Float32Array;
+  /**
+   * If asked for, the surface that each point belongs to: its place among `report.components.largest`, 0 for the largest, and
+   * so on beyond the end of that list; 4294967295 for unresolved points.
+   */
+  components?: Uint32Array;
   report: Report;
 }
 
@@ -94,11 +101,17 @@ export interface Report {
   /** Points interpolated from 0, 1, 2, 3 and 4 nodes; all from 0 for the baselines and with `cell: 'auto'`. */
   nodesUsed: [number, number, number, number, number];
   /**
-   * The surfaces that were given one sign each, the largest first. `side` tells by what: `'air'`, because the open air lies
-   * on one side only; `'volume'`, away from the middle of what is open to both. `confidence`: how much more of the evidence
-   * speaks for that side than for the other, from 0, a guess, to 1. Only with `orient: 'consistent'` and `'outward'`.
+   * The surfaces that were given one sign each: how many there are, and at most the thousand largest, the largest first.
+   * `side` tells by what: `'air'`, because the open air lies on one side only; `'volume'`, away from the middle of what is open
+   * to both, or to neither; `'convention'`, because it is open and flat, so that nothing tells: the mean normal has
+   * `x + 2y + 4z >= 0`. `confidence`, from 0, a guess, to 1, which is sure: by the air, of all that is seen of the open, how much
+   * more is seen from that side; by volume how much there is, of that of a sphere. Only with `orient: 'consistent'` and
+   * `'outward'`.
    */
-  components?: { points: number; side: 'air' | 'volume'; confidence: number }[];
+  components?: {
+    count: number;
+    largest: { points: number; side: 'air' | 'volume' | 'convention'; confidence: number }[];
+  };
   /**
    * Each phase in the wasm module, and `total`: from the moment the call left the queue to its result in the calling
    * thread, so with the start of the worker if this call needed one, and with copying in and out.

@@ -13,6 +13,7 @@ export interface Buffer {
 export interface Estimation {
   normals: Buffer;
   curvature?: Buffer;
+  components?: Buffer;
   report: object;
 }
 

@@ -4,82 +4,112 @@ use super::patches::Patches;
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
-use crate::points::reserve;
+use crate::lattice::{BRICK, cube_place};
+use crate::parallel::Gathering;
+use crate::points::{filled, reserve};
 use crate::progress::Stage;
+use crate::surroundings::STEPS;
 use glam::{IVec3, Vec3};
+use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// Directions in which to look for the open air: to the faces, edges and corners of a cube.
-const DIRECTIONS: usize = 26;
+/// Directions in which to look for the open air: to the faces, edges and corners of a cube, all steps but that to itself.
+const DIRECTIONS: usize = STEPS.len() - 1;
 
 /// A surface that is open to one half of space sees it with some 9 of the directions.
 const HALF: f32 = 9.0;
 
-/// For each patch, what speaks for its normal to point outwards: near 1 where it looks into the open and its back does
-/// not, -1 where it is the other way round, 0 where neither does, or both.
+/// What errors call the memory of all this.
+const WHAT: &str = "the open sides";
+
+/// How much of the open air the patches look into, from 0 to about 1 for each of its sides.
+pub(super) struct Sights {
+    /// For each patch what it sees along its normal, less what it sees against it: positive if that points outwards.
+    pub exposure: Vec<f32>,
+    /// For each patch the sum of both.
+    pub all: Vec<f32>,
+}
+
+/// Looks out from every patch.
 ///
 /// A patch looks into the open in a direction in which no voxel (a cube, or more in a large empty box) between its own and
 /// the end of the box is occupied. Each direction is one sweep over the bits of all voxels, 64 at a time. After the votes on
 /// facets of Takayama, Jacobson, Kavan and Sorkine-Hornung, "A simple method for correcting facet orientations in polygon
 /// meshes based on ray casting", 2014.
-pub(super) fn exposure(grid: &Grid, patches: &Patches, points: usize, stage: &Stage) -> Result<Vec<f32>, Error> {
+pub(super) fn sights(grid: &Grid, patches: &Patches, points: usize, stage: &Stage) -> Result<Sights, Error> {
     let voxels = Voxels::of(grid, points)?;
     let mut seen: Vec<AtomicU32> = Vec::new();
-    reserve(&mut seen, grid.cubes(), "the open sides")?;
+    reserve(&mut seen, grid.cubes(), WHAT)?;
     seen.resize_with(grid.cubes(), AtomicU32::default);
-    stage.run(DIRECTIONS, &|number| {
-        let open = voxels.open(direction(number));
-        let mut seen = seen.iter();
-        for (&place, &mask) in grid.bricks.places.iter().zip(&grid.masks) {
-            for (bit, seen) in set_bits(mask).zip(&mut seen) {
-                if voxels.of_cube(place, bit).is_some_and(|voxel| open.holds(voxel)) {
-                    seen.fetch_or(1 << number, Relaxed);
-                }
-            }
+    let failures = Gathering::new(WHAT);
+    stage.run_in(1, DIRECTIONS, &|number| {
+        let see = |cube: usize| {
+            seen[cube].fetch_or(1 << number, Relaxed);
+        };
+        if let Err(error) = voxels.sweep(grid, direction(number), &see) {
+            failures.append(vec![error]);
         }
     })?;
-    let along: [Vec3; DIRECTIONS] = std::array::from_fn(|number| direction(number).as_vec3().normalize() / HALF);
-    let mut exposure = Vec::new();
-    reserve(&mut exposure, patches.all.len(), "the open sides")?;
-    for (seen, ends) in seen.into_iter().zip(patches.first.windows(2)) {
-        let open: Vec3 = set_bits(seen.into_inner().into()).map(|number| along[number as usize]).sum();
-        let own = &patches.all[ends[0] as usize..ends[1] as usize];
-        exposure.extend(own.iter().map(|patch| open.dot(patch.normal)));
+    if let Some(error) = failures.all()?.pop() {
+        return Err(error);
     }
-    Ok(exposure)
+    let mut sights = Sights { exposure: Vec::new(), all: Vec::new() };
+    reserve(&mut sights.exposure, patches.all.len(), WHAT)?;
+    reserve(&mut sights.all, patches.all.len(), WHAT)?;
+    for (cube, seen) in seen.into_iter().enumerate() {
+        let seen = seen.into_inner();
+        let open = openness(seen);
+        for patch in &patches.all[patches.of_cube(cube)] {
+            let along = |number: u32| (direction(number as usize).as_vec3().normalize().dot(patch.normal) / HALF).abs();
+            sights.exposure.push(open.dot(patch.normal));
+            sights.all.push(set_bits(seen.into()).map(along).sum());
+        }
+    }
+    Ok(sights)
 }
 
 fn direction(number: usize) -> IVec3 {
-    // Not the cube in the middle.
-    let i = (number + usize::from(number >= DIRECTIONS / 2)) as i32;
-    IVec3::new(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1)
+    STEPS[number + usize::from(number >= DIRECTIONS / 2)]
+}
+
+/// The sum of the directions that are set. What is open to opposite directions alike sums up to nothing, to the bit: rounding
+/// must not speak for a side.
+fn openness(seen: u32) -> Vec3 {
+    // Those to faces, edges and corners, of lengths 1, 2 and 3 squared.
+    let mut sums = [IVec3::ZERO; 4];
+    for number in set_bits(seen.into()) {
+        let direction = direction(number as usize);
+        sums[direction.length_squared() as usize] += direction;
+    }
+    let along = |squared: u8| sums[usize::from(squared)].as_vec3() / f32::from(squared).sqrt();
+    (along(1) + along(2) + along(3)) / HALF
 }
 
 /// A bit for each voxel of the box round all occupied bricks, in rows along x.
 struct Voxels {
+    /// The first cube.
     first: IVec3,
     /// How often the edge of a cube is doubled.
     doublings: u32,
-    bits: Bits,
-}
-
-#[derive(Clone)]
-struct Bits {
     size: IVec3,
     /// Words of a row.
     width: usize,
     words: Vec<u64>,
+    /// The bricks by z, with that.
+    bricks: Vec<(i32, u32)>,
 }
 
 impl Voxels {
     fn of(grid: &Grid, points: usize) -> Result<Self, Error> {
-        // Two bits a point, and no less than is done at once.
+        // Two bytes a point, and no less than is done at once.
         let most = (16.0 * points as f64).max(4e6);
         let volume = |size: IVec3| f64::from((size.x + 63) & !63) * f64::from(size.y) * f64::from(size.z);
-        let (mut first, mut size) = box_round(&grid.bricks.places, 0.0);
+        let mut places = Vec::new();
+        reserve(&mut places, grid.bricks.len(), WHAT)?;
+        let (mut first, mut size) = box_round(&grid.bricks.places, 0.0, &mut places);
         if volume(size) > most {
             // Without what strays; that is not asked, and hides nothing.
-            (first, size) = box_round(&grid.bricks.places, STRAY);
+            (first, size) = box_round(&grid.bricks.places, STRAY, &mut places);
         }
         let (cubes, mut doublings) = (size, 0);
         while volume(size) > most {
@@ -87,118 +117,166 @@ impl Voxels {
             size = (cubes + ((1 << doublings) - 1)) >> doublings;
         }
         let width = (size.x as usize).div_ceil(64);
-        let mut words = Vec::new();
-        let length = width * size.y as usize * size.z as usize;
-        reserve(&mut words, length, "the voxels")?;
-        words.resize(length, 0);
-        let mut voxels = Self { first, doublings, bits: Bits { size, width, words } };
+        let words = filled(0, width * size.y as usize * size.z as usize, WHAT)?;
+        let mut bricks = Vec::new();
+        reserve(&mut bricks, grid.bricks.len(), WHAT)?;
+        bricks.extend(grid.bricks.places.iter().map(|place| place.z).zip(0..));
+        bricks.sort_unstable();
+        let mut voxels = Self { first, doublings, size, width, words, bricks };
         for (&place, &mask) in grid.bricks.places.iter().zip(&grid.masks) {
             for bit in set_bits(mask) {
                 if let Some(voxel) = voxels.of_cube(place, bit) {
-                    let (word, bit) = voxels.bits.place(voxel);
-                    voxels.bits.words[word] |= bit;
+                    let (word, bit) = voxels.bit(voxel);
+                    let start = voxel.z as usize * voxels.plane();
+                    voxels.words[start + word] |= bit;
                 }
             }
         }
         Ok(voxels)
     }
 
-    /// The voxel of a cube, unless that strays.
-    #[inline(always)]
-    fn of_cube(&self, brick: IVec3, bit: u32) -> Option<IVec3> {
-        let bit = bit as i32;
-        let cube = 4 * brick + IVec3::new(bit & 3, bit >> 2 & 3, bit >> 4) - self.first;
-        let voxel = cube >> self.doublings;
-        // Below the first are large numbers.
-        voxel.as_uvec3().cmplt(self.bits.size.as_uvec3()).all().then_some(voxel)
+    /// Calls `see` with every cube in whose voxel nothing hides the air in a direction.
+    ///
+    /// Goes through the planes of voxels from the end that the direction points to, so that whatever is open lies behind what
+    /// was found open and free: no more than three planes are in memory.
+    fn sweep(&self, grid: &Grid, direction: IVec3, see: &dyn Fn(usize)) -> Result<(), Error> {
+        let IVec3 { x: dx, y: dy, z: dz } = direction;
+        let from_the_end = |count: i32, step: i32| (0..count).map(move |i| if step > 0 { count - 1 - i } else { i });
+        // What is open in this plane, what of it is not occupied, and the latter in the plane beyond.
+        let plane = || filled(u64::MAX, self.plane(), WHAT);
+        let (mut open, mut free, mut beyond) = (plane()?, plane()?, plane()?);
+        for z in from_the_end(self.size.z, dz) {
+            let occupied = &self.words[z as usize * self.plane()..][..self.plane()];
+            for y in from_the_end(self.size.y, dy) {
+                let (row, behind) = (self.row(y), y + dy);
+                let free_behind = if dz == 0 { &free } else { &beyond };
+                if dy == 0 && dz == 0 {
+                    open_along(&occupied[row.clone()], dx > 0, &mut open[row.clone()]);
+                } else if behind < 0 || behind >= self.size.y {
+                    open[row.clone()].fill(u64::MAX);
+                } else {
+                    shifted(&free_behind[self.row(behind)], dx, &mut open[row.clone()]);
+                }
+                for place in row {
+                    free[place] = open[place] & !occupied[place];
+                }
+            }
+            self.each_cube(grid, z, &|voxel, cube| {
+                let (word, bit) = self.bit(voxel);
+                if open[word] & bit != 0 {
+                    see(cube);
+                }
+            });
+            std::mem::swap(&mut free, &mut beyond);
+        }
+        Ok(())
     }
 
-    /// The voxels beyond which none is occupied along a direction.
-    fn open(&self, direction: IVec3) -> Bits {
-        let occupied = &self.bits;
-        let mut open = Bits { words: vec![u64::MAX; occupied.words.len()], ..*occupied };
-        let IVec3 { x: dx, y: dy, z: dz } = direction;
-        let IVec3 { y: rows, z: planes, .. } = occupied.size;
-        // From the end that the direction points to.
-        let at = |i: i32, count: i32, step: i32| if step > 0 { count - 1 - i } else { i };
-        let mut free = vec![0; occupied.width];
-        for i in 0..planes {
-            let z = at(i, planes, dz);
-            for j in 0..rows {
-                let y = at(j, rows, dy);
-                let row = occupied.row(y, z);
-                if dy == 0 && dz == 0 {
-                    let mut is_open = true;
-                    for word in 0..occupied.width {
-                        let word = row.start + if dx > 0 { occupied.width - 1 - word } else { word };
-                        let bits = occupied.words[word];
-                        open.words[word] = match (is_open, bits, dx > 0) {
-                            (false, ..) => 0,
-                            (true, 0, _) => u64::MAX,
-                            (true, _, true) => u64::MAX << (63 - bits.leading_zeros()),
-                            (true, _, false) => u64::MAX >> (63 - bits.trailing_zeros()),
-                        };
-                        is_open &= bits == 0;
-                    }
-                    continue;
-                }
-                let (y, z) = (y + dy, z + dz);
-                if y < 0 || y >= rows || z < 0 || z >= planes {
-                    continue;
-                }
-                let beyond = occupied.row(y, z);
-                for (free, word) in free.iter_mut().zip(beyond) {
-                    *free = open.words[word] & !occupied.words[word];
-                }
-                for word in 0..occupied.width {
-                    let near = |free: Option<&u64>| free.copied().unwrap_or(u64::MAX);
-                    open.words[row.start + word] = match dx {
-                        0 => free[word],
-                        1 => free[word] >> 1 | near(free.get(word + 1)) << 63,
-                        _ => free[word] << 1 | near(word.checked_sub(1).and_then(|word| free.get(word))) >> 63,
-                    };
+    /// Calls `work` with the voxel and the number of every cube in a plane of voxels.
+    fn each_cube(&self, grid: &Grid, z: i32, work: &dyn Fn(IVec3, usize)) {
+        let plane = |brick: i32, cube: i32| (BRICK * brick + cube - self.first.z) >> self.doublings;
+        let start = self.bricks.partition_point(|&(brick, _)| plane(brick, BRICK - 1) < z);
+        let end = self.bricks.partition_point(|&(brick, _)| plane(brick, 0) <= z);
+        for &(layer, brick) in &self.bricks[start..end] {
+            let brick = brick as usize;
+            let own =
+                (0..BRICK).filter(|&cube| plane(layer, cube) == z).fold(0, |own, cube| own | 0xFFFF << (16 * cube));
+            for bit in set_bits(grid.masks[brick] & own) {
+                if let Some(voxel) = self.of_cube(grid.bricks.places[brick], bit) {
+                    work(voxel, grid.cube(brick, bit) as usize);
                 }
             }
         }
-        open
+    }
+
+    /// The voxel of a cube, unless that strays.
+    #[inline(always)]
+    fn of_cube(&self, brick: IVec3, bit: u32) -> Option<IVec3> {
+        let voxel = (BRICK * brick + cube_place(bit) - self.first) >> self.doublings;
+        // Below the first are large numbers.
+        voxel.as_uvec3().cmplt(self.size.as_uvec3()).all().then_some(voxel)
+    }
+
+    /// Words of a plane.
+    fn plane(&self) -> usize {
+        self.width * self.size.y as usize
+    }
+
+    /// The words of a row, in its plane.
+    fn row(&self, y: i32) -> Range<usize> {
+        y as usize * self.width..(y as usize + 1) * self.width
+    }
+
+    /// The word of a voxel in its plane, and its bit there.
+    #[inline(always)]
+    fn bit(&self, voxel: IVec3) -> (usize, u64) {
+        (self.row(voxel.y).start + voxel.x as usize / 64, 1 << (voxel.x % 64))
     }
 }
 
-/// The first cube, and the size in cubes, of a box round all bricks but a share at each end of each axis.
-fn box_round(bricks: &[IVec3], share: f64) -> (IVec3, IVec3) {
-    if bricks.is_empty() {
-        return (IVec3::ZERO, IVec3::ZERO);
-    }
-    let [low, high] = [share, 1.0 - share].map(|quantile| {
-        let rank = ((bricks.len() - 1) as f64 * quantile).round() as usize;
-        let along = |axis: usize| {
-            let mut places: Vec<i32> = bricks.iter().map(|brick| brick[axis]).collect();
-            *places.select_nth_unstable(rank).1
+/// What of a row is open along it.
+fn open_along(occupied: &[u64], is_upwards: bool, open: &mut [u64]) {
+    let mut is_open = true;
+    for i in 0..occupied.len() {
+        let word = if is_upwards { occupied.len() - 1 - i } else { i };
+        let bits = occupied[word];
+        open[word] = match (is_open, bits, is_upwards) {
+            (false, ..) => 0,
+            (true, 0, _) => u64::MAX,
+            (true, _, true) => u64::MAX << (63 - bits.leading_zeros()),
+            (true, _, false) => u64::MAX >> (63 - bits.trailing_zeros()),
         };
-        IVec3::new(along(0), along(1), along(2))
-    });
-    (4 * low, 4 * (high - low + 1))
+        is_open &= bits == 0;
+    }
+}
+
+/// For each voxel of a row the bit `dx` further in another; beyond its ends is air.
+fn shifted(row: &[u64], dx: i32, to: &mut [u64]) {
+    let word = |i: Option<usize>| i.and_then(|i| row.get(i)).copied().unwrap_or(u64::MAX);
+    for (i, to) in to.iter_mut().enumerate() {
+        *to = match dx {
+            0 => row[i],
+            1 => row[i] >> 1 | word(Some(i + 1)) << 63,
+            _ => row[i] << 1 | word(i.checked_sub(1)) >> 63,
+        };
+    }
 }
 
 /// The share of bricks at each end of an axis that may stray.
 const STRAY: f64 = 0.005;
 
-impl Bits {
-    fn row(&self, y: i32, z: i32) -> std::ops::Range<usize> {
-        let start = (z as usize * self.size.y as usize + y as usize) * self.width;
-        start..start + self.width
+/// The first cube, and the size in cubes, of a box round all bricks but a share at each end of each axis; `places` is memory
+/// for as many numbers.
+fn box_round(bricks: &[IVec3], share: f64, places: &mut Vec<i32>) -> (IVec3, IVec3) {
+    if bricks.is_empty() {
+        return (IVec3::ZERO, IVec3::ZERO);
     }
+    let mut low_and_high = |axis: usize| {
+        places.clear();
+        places.extend(bricks.iter().map(|brick| brick[axis]));
+        [share, 1.0 - share].map(|quantile| {
+            let rank = ((bricks.len() - 1) as f64 * quantile).round() as usize;
+            *places.select_nth_unstable(rank).1
+        })
+    };
+    let [x, y, z] = [0, 1, 2].map(&mut low_and_high);
+    let (low, high) = (IVec3::new(x[0], y[0], z[0]), IVec3::new(x[1], y[1], z[1]));
+    (BRICK * low, BRICK * (high - low + 1))
+}
 
-    /// The word of a voxel, and its bit there.
-    #[inline(always)]
-    fn place(&self, voxel: IVec3) -> (usize, u64) {
-        let row = self.row(voxel.y, voxel.z);
-        (row.start + voxel.x as usize / 64, 1 << (voxel.x % 64))
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-    #[inline(always)]
-    fn holds(&self, voxel: IVec3) -> bool {
-        let (word, bit) = self.place(voxel);
-        self.words[word] & bit != 0
+    #[test]
+    fn what_is_open_to_both_sides_is_open_to_none() {
+        let opposite = |number: usize| DIRECTIONS - 1 - number;
+        for number in 0..DIRECTIONS {
+            assert_eq!(direction(number), -direction(opposite(number)));
+        }
+        let up: u32 = (0..DIRECTIONS).filter(|&number| direction(number).z > 0).map(|number| 1 << number).sum();
+        let down: u32 = (0..DIRECTIONS).filter(|&number| direction(number).z < 0).map(|number| 1 << number).sum();
+        assert_eq!(openness(up | down), Vec3::ZERO);
+        assert!((openness(up) - 0.7 * Vec3::Z).length() < 0.1, "{}", openness(up));
     }
 }

@@ -1,12 +1,11 @@
 //! One sign for each patch: groups of them that agree, merged from the strongest evidence to the weakest, then mended.
 
-use super::links::{Link, Links};
+use super::links::{GRAPH, Link, Links};
 use crate::error::Error;
-use crate::points::{filled, reserve};
+use crate::points::{filled, reserve, starts};
+use crate::power::exp2;
 use crate::progress::Stage;
-
-/// What errors call the memory of all this.
-const WHAT: &str = "the graph of patches";
+use std::ops::Neg;
 
 /// The signs of all patches, and which of them hang together.
 pub(super) struct Signs {
@@ -30,26 +29,32 @@ struct Level {
     flipped: Vec<bool>,
 }
 
-/// Chooses the signs that make the sum of all evidence large: of the links between two patches, and `own`, what speaks
-/// for a patch not to be flipped.
+/// Chooses the signs that make the sum of all evidence large: of the links between two patches, and `exposure`, what
+/// speaks for a patch not to be flipped.
 ///
 /// Rounds of Boruvka's: every group merges with the one that it has the strongest evidence for or against, and the evidence
 /// between the merged ones is added up, so that many weak links outvote a strong wrong one. A round at least halves the
-/// groups that have links: linear in the links. Then back from the last to the first: whatever gains by being flipped is.
+/// groups that have evidence enough to merge, and few get it later: linear in the links but for odd clouds, and never more
+/// than [`ROUNDS`] times as long. Then back from the last to the first: whatever gains by being flipped is.
 ///
 /// What speaks for the patches of a group adds up like its area, the evidence of its neighbours only like its rim. Beyond
 /// `span` patches the former is made to grow like the rim too.
-pub(super) fn signs(links: Links, own: Vec<f32>, span: f32, stage: &Stage) -> Result<Signs, Error> {
+pub(super) fn signs(links: Links, exposure: &[f32], span: f32, stage: &Stage) -> Result<Signs, Error> {
     let patches = links.len();
     let mut levels = Vec::new();
-    let (mut links, mut own, mut sizes) = (links, own, filled(1, patches, WHAT)?);
-    let mut component = filled(0u32, patches, WHAT)?;
+    let (mut links, mut sizes) = (links, filled(1, patches, GRAPH)?);
+    let mut own = Vec::new();
+    reserve(&mut own, patches, GRAPH)?;
+    own.extend_from_slice(exposure);
+    let mut component = filled(0u32, patches, GRAPH)?;
     component.iter_mut().zip(0..).for_each(|(component, one)| *component = one);
     let mut count = patches;
-    stage.tell(0.0)?;
-    while let Some(Merging { group, flipped, groups }) = merge(&links, &sizes)? {
+    for _ in 0..ROUNDS {
+        stage.tell(0.7 * (1.0 - count as f64 / patches as f64))?;
+        let Some(Merging { group, flipped, groups }) = merge(&links, &sizes)? else { break };
+        stage.tell(0.7 * (1.0 - (count + groups) as f64 / 2.0 / patches as f64))?;
         let (merged, sums) = gather(&links, &own, &group, &flipped, groups)?;
-        let mut counts = filled(0, groups, WHAT)?;
+        let mut counts = filled(0, groups, GRAPH)?;
         group.iter().zip(&sizes).for_each(|(&group, &size)| counts[group as usize] += size);
         component.iter_mut().for_each(|component| *component = group[*component as usize]);
         levels.push(Level {
@@ -60,14 +65,15 @@ pub(super) fn signs(links: Links, own: Vec<f32>, span: f32, stage: &Stage) -> Re
             flipped,
         });
         count = groups;
-        stage.tell(0.7 * (1.0 - count as f64 / patches as f64))?;
     }
     // From the last level to the first; `trust` is the weight of what speaks for a sign by itself.
-    let descend = |trust: f32| -> Result<Vec<bool>, Error> {
-        let mut flipped = filled(false, own.len(), WHAT)?;
+    let descend = |trust: f32, stage: &Stage| -> Result<Vec<bool>, Error> {
+        let mut flipped = filled(false, own.len(), GRAPH)?;
         flipped.iter_mut().zip(&own).for_each(|(flipped, own)| *flipped = *own < 0.0);
-        for Level { links, own, sizes, group, flipped: within } in levels.iter().rev() {
-            let mut finer = filled(false, group.len(), WHAT)?;
+        for (number, Level { links, own, sizes, group, flipped: within }) in levels.iter().enumerate().rev() {
+            // Each level has about twice as many groups as the next.
+            stage.tell(exp2(-(number as f64)))?;
+            let mut finer = filled(false, group.len(), GRAPH)?;
             for ((finer, &group), within) in finer.iter_mut().zip(group).zip(within) {
                 *finer = within ^ flipped[group as usize];
             }
@@ -77,13 +83,12 @@ pub(super) fn signs(links: Links, own: Vec<f32>, span: f32, stage: &Stage) -> Re
         }
         Ok(flipped)
     };
-    let mut flipped = descend(1.0)?;
+    let mut flipped = descend(1.0, &stage.part(0.7..0.8))?;
     if let Some(Level { links, own, .. }) = levels.first() {
         // Flipping one small group after the other does not reach a far better choice behind worse ones, as where both
         // sides of a thin noisy wall were taken for one.
-        stage.tell(0.8)?;
-        let bold = descend(BOLDNESS)?;
-        let mut gains = filled(0.0, count, WHAT)?;
+        let bold = descend(BOLDNESS, &stage.part(0.8..0.95))?;
+        let mut gains = filled(0.0, count, GRAPH)?;
         for (one, &component) in component.iter().enumerate() {
             gains[component as usize] += score(links, own, &bold, one) - score(links, own, &flipped, one);
         }
@@ -102,11 +107,14 @@ pub(super) fn signs(links: Links, own: Vec<f32>, span: f32, stage: &Stage) -> Re
 /// they are surfaces of their own.
 const TOUCH: f32 = 0.1;
 
+/// How often groups merge at the most; five to twelve times is what scans need.
+const ROUNDS: usize = 40;
+
 /// How much more than by rights the second choice trusts what speaks for a sign by itself.
 const BOLDNESS: f32 = 3.0;
 
-fn signed(is_flipped: bool, evidence: f32) -> f32 {
-    if is_flipped { -evidence } else { evidence }
+pub(super) fn signed<T: Neg<Output = T>>(is_flipped: bool, one: T) -> T {
+    if is_flipped { -one } else { one }
 }
 
 /// What the evidence says to the sign of one, given those of the others.
@@ -135,7 +143,7 @@ struct Merging {
 fn merge(links: &Links, sizes: &[u32]) -> Result<Option<Merging>, Error> {
     let count = links.len();
     // Towards the root of the group, and whether flipped against it.
-    let mut parents = filled((0u32, false), count, WHAT)?;
+    let mut parents = filled((0u32, false), count, GRAPH)?;
     parents.iter_mut().zip(0..).for_each(|(parent, one)| parent.0 = one);
     let mut is_merged = false;
     for one in 0..count {
@@ -159,7 +167,7 @@ fn merge(links: &Links, sizes: &[u32]) -> Result<Option<Merging>, Error> {
     if !is_merged {
         return Ok(None);
     }
-    let (mut group, mut flipped) = (filled(0, count, WHAT)?, filled(false, count, WHAT)?);
+    let (mut group, mut flipped) = (filled(0, count, GRAPH)?, filled(false, count, GRAPH)?);
     let mut groups = 0;
     for one in 0..count {
         let (root, is_flipped) = root(&mut parents, one as u32);
@@ -197,61 +205,55 @@ fn gather(
     flipped: &[bool],
     groups: usize,
 ) -> Result<(Links, Vec<f32>), Error> {
-    let mut sums = filled(0.0, groups, WHAT)?;
+    let (mut sums, mut counts) = (filled(0.0, groups, GRAPH)?, filled(0u32, groups, GRAPH)?);
+    for (one, &group) in group.iter().enumerate() {
+        sums[group as usize] += signed(flipped[one], own[one]);
+        counts[group as usize] += 1;
+    }
     // The members of each group, one after the other.
-    let mut ends = filled(0u32, groups + 1, WHAT)?;
-    for (one, &group) in group.iter().enumerate() {
-        sums[group as usize] += if flipped[one] { -own[one] } else { own[one] };
-        ends[group as usize + 1] += 1;
+    let first = starts(&counts, GRAPH)?;
+    let mut members = filled(0u32, group.len(), GRAPH)?;
+    for (one, &group) in group.iter().enumerate().rev() {
+        counts[group as usize] -= 1;
+        members[first[group as usize] + counts[group as usize] as usize] = one as u32;
     }
-    for i in 0..groups {
-        ends[i + 1] += ends[i];
-    }
-    let mut next = ends.clone();
-    let mut members = filled(0u32, group.len(), WHAT)?;
-    for (one, &group) in group.iter().enumerate() {
-        members[next[group as usize] as usize] = one as u32;
-        next[group as usize] += 1;
-    }
-    let mut merged = Links::default();
-    // No more than there were, and seldom much fewer than half.
-    reserve(&mut merged.all, links.all.len() / 2, WHAT)?;
-    reserve(&mut merged.first, groups + 1, WHAT)?;
-    merged.first.push(0);
-    // Where the link to a group stands; none before the own start.
-    let mut places = filled(u32::MAX, groups, WHAT)?;
+    let mut merged = Links::with_capacity(groups)?;
+    // Where the link to a group stands among those of one.
+    let mut places = filled(usize::MAX, groups, GRAPH)?;
     for one in 0..groups {
-        let start = merged.all.len();
-        for &member in &members[ends[one] as usize..ends[one + 1] as usize] {
-            for link in links.from(member as usize) {
-                let to = group[link.to as usize];
-                if to as usize == one {
-                    continue;
-                }
-                let is_flipped = flipped[member as usize] ^ flipped[link.to as usize];
-                let evidence = if is_flipped { -link.evidence } else { link.evidence };
-                let place = places[to as usize] as usize;
-                if place >= start && place < merged.all.len() && merged.all[place].to == to {
-                    merged.all[place].evidence += evidence;
-                } else {
-                    places[to as usize] = merged.all.len() as u32;
-                    merged.all.push(Link { to, evidence });
+        let own = &members[first[one]..first[one + 1]];
+        let from = |member: u32| links.from(member as usize);
+        merged.push(own.iter().map(|&member| from(member).len()).sum(), |list| {
+            let start = list.len();
+            for &member in own {
+                for link in from(member) {
+                    let to = group[link.to as usize];
+                    if to as usize == one {
+                        continue;
+                    }
+                    let evidence = signed(flipped[member as usize] ^ flipped[link.to as usize], link.evidence);
+                    let place = &mut places[to as usize];
+                    if !(start..list.len()).contains(place) || list[*place].to != to {
+                        *place = list.len();
+                        list.push(Link { to, evidence: 0.0 });
+                    }
+                    list[*place].evidence += evidence;
                 }
             }
-        }
-        merged.first.push(merged.all.len() as u32);
+        })?;
     }
     Ok((merged, sums))
 }
 
-/// Flips what gains by it, until nothing does; each flip raises the sum of all evidence.
+/// Flips what gains by it, round by round; each flip raises the sum of all evidence.
 #[inline(never)]
 fn mend(links: &Links, own: &dyn Fn(usize) -> f32, flipped: &mut [bool]) -> Result<(), Error> {
+    /// More flip next to nothing.
     const ROUNDS: usize = 16;
     /// Less is rounding.
     const LEAST: f32 = 1e-6;
     // Whose neighbours changed since it was asked.
-    let mut is_stirred = filled(true, flipped.len(), WHAT)?;
+    let mut is_stirred = filled(true, flipped.len(), GRAPH)?;
     for _ in 0..ROUNDS {
         let mut any = false;
         for one in 0..flipped.len() {

@@ -4,11 +4,14 @@ use super::patches::{Patch, Patches};
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
-use crate::parallel::Gathering;
+use crate::parallel::Filling;
 use crate::points::reserve;
 use crate::progress::Stage;
 use crate::surroundings::{NEAR, Places, Surroundings};
 use glam::{Vec3, Vec4Swizzles};
+
+/// What errors call the memory of the links.
+pub(super) const GRAPH: &str = "the graph of patches";
 
 /// What speaks for two normals to agree in sign, from 1 (they do) to -1 (one must be flipped).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,11 +21,20 @@ pub(super) struct Link {
 }
 
 /// For each patch, or each group of them, its links; a link stands in both of its ends.
-#[derive(Debug, Default)]
+///
+/// In many lists, because they are most of the memory: one for all would be there twice while it grows.
+#[derive(Default)]
 pub(super) struct Links {
-    /// The first link of each; one more at the end.
-    pub first: Vec<u32>,
-    pub all: Vec<Link>,
+    runs: Vec<Run>,
+    lists: Vec<Vec<Link>>,
+}
+
+/// The links of one: a part of a list.
+#[derive(Clone, Copy)]
+struct Run {
+    list: usize,
+    start: usize,
+    end: usize,
 }
 
 /// With less noise the patches of a surface lie on arcs nearly exactly; what does not is another sheet nearby.
@@ -31,62 +43,81 @@ const CLEAN: f32 = 0.05;
 /// Less is no evidence, and costs memory.
 const LEAST: f32 = 0.01;
 
+/// Links that a list has room for, unless one group has more.
+const LIST: usize = 1 << 14;
+
 impl Links {
     /// Links every patch to those in its cube and the 26 round it; `noise` is that of the points, in edges. One pass over the
     /// patches.
     pub fn of(grid: &Grid, patches: &Patches, noise: f32, stage: &Stage) -> Result<Self, Error> {
         let sharpness = if noise < CLEAN { 9 } else { 5 };
-        let found = Gathering::new("the graph of patches");
-        stage.run(grid.blocks.len(), &|block| {
+        let runs = Filling::new(patches.all.len(), GRAPH)?;
+        let lists = stage.collect(grid.blocks.len(), GRAPH, &|block| {
             let mut surroundings = Surroundings::new();
-            let (mut lengths, mut links) = (Vec::new(), Vec::new());
-            for brick in grid.blocks[block].clone() {
-                surroundings.look(grid, brick);
-                for (cube, bit) in (grid.first_cube[brick] as usize..).zip(set_bits(grid.masks[brick])) {
-                    for own in patches.first[cube]..patches.first[cube + 1] {
-                        let (before, patch) = (links.len(), &patches.all[own as usize]);
-                        for near in set_bits(surroundings.occupied.near(bit)) {
-                            let cube = surroundings.cube(Places::of_near(bit, near));
-                            let step = NEAR[near as usize % 64].xyz();
-                            for to in patches.first[cube]..patches.first[cube + 1] {
-                                let evidence = evidence(patch, &patches.all[to as usize], step, sharpness);
-                                if to != own && evidence.abs() > LEAST {
-                                    links.push(Link { to, evidence });
-                                }
+            let (mut near, mut links) = (Vec::new(), Vec::new());
+            let mut looked_at = None;
+            for (brick, cube, bit) in grid.cubes_in(block) {
+                if looked_at.replace(brick) != Some(brick) {
+                    surroundings.look(grid, brick);
+                }
+                near.clear();
+                for place in set_bits(surroundings.occupied.near(bit)) {
+                    let cube = surroundings.cube(Places::of_near(bit, place));
+                    near.push((patches.of_cube(cube), NEAR[place as usize % 64].xyz()));
+                }
+                for own in patches.of_cube(cube) {
+                    let (start, patch) = (links.len(), &patches.all[own]);
+                    for (others, step) in &near {
+                        for to in others.clone() {
+                            let evidence = evidence(patch, &patches.all[to], *step, sharpness);
+                            if to != own && evidence.abs() > LEAST {
+                                links.push(Link { to: to as u32, evidence });
                             }
                         }
-                        lengths.push((links.len() - before) as u32);
                     }
+                    // SAFETY: a patch belongs to one cube, and a cube to one block.
+                    unsafe { runs.write(own, Run { list: block, start, end: links.len() }) };
                 }
             }
-            found.append(vec![(block, lengths, links)]);
+            links.shrink_to_fit();
+            links
         })?;
-        let mut found = found.all()?;
-        found.sort_unstable_by_key(|&(block, ..)| block);
-        let mut all = Self::default();
-        reserve(&mut all.first, patches.all.len() + 1, "the graph of patches")?;
-        reserve(&mut all.all, found.iter().map(|(.., links)| links.len()).sum(), "the graph of patches")?;
-        all.first.push(0);
-        let mut total = 0;
-        for (_, lengths, mut links) in found {
-            for length in lengths {
-                total += length;
-                all.first.push(total);
-            }
-            all.all.append(&mut links);
+        // SAFETY: the blocks hold all cubes, and these all patches.
+        Ok(Self { runs: unsafe { runs.complete() }, lists })
+    }
+
+    /// Memory for those of so many patches or groups.
+    pub fn with_capacity(count: usize) -> Result<Self, Error> {
+        let mut links = Self::default();
+        reserve(&mut links.runs, count, GRAPH)?;
+        Ok(links)
+    }
+
+    /// Appends one with the links that `add` appends to a list, at most `most`.
+    pub fn push(&mut self, most: usize, add: impl FnOnce(&mut Vec<Link>)) -> Result<(), Error> {
+        if self.lists.last().is_none_or(|list| list.capacity() - list.len() < most) {
+            let mut list = Vec::new();
+            reserve(&mut list, most.max(LIST), GRAPH)?;
+            self.lists.push(list);
         }
-        Ok(all)
+        let number = self.lists.len() - 1;
+        let list = &mut self.lists[number];
+        let start = list.len();
+        add(list);
+        self.runs.push(Run { list: number, start, end: list.len() });
+        Ok(())
     }
 
     /// How many patches or groups there are.
     pub fn len(&self) -> usize {
-        self.first.len() - 1
+        self.runs.len()
     }
 
     /// The links of one.
     #[inline]
     pub fn from(&self, one: usize) -> &[Link] {
-        &self.all[self.first[one] as usize..self.first[one + 1] as usize]
+        let Run { list, start, end } = self.runs[one];
+        &self.lists[list][start..end]
     }
 }
 
@@ -99,9 +130,11 @@ impl Links {
 /// normals is no evidence, as noise of one surface and both sides of a wall look the same.
 #[inline(always)]
 fn evidence(a: &Patch, b: &Patch, step: Vec3, sharpness: i32) -> f32 {
-    let line = step + b.centre - a.centre;
+    // So that the other way round it is the opposite to the bit.
+    let line = step + (b.centre - a.centre);
     let square = line.length_squared();
     let dot = a.normal.dot(b.normal);
+    // In one place: between centres less than a fiftieth of an edge apart there is no line, only two normals that cross.
     if square < 4e-4 {
         return dot * dot * dot;
     }

@@ -3,11 +3,12 @@
 use crate::error::Error;
 use crate::grid::{Grid, Placed};
 use crate::lattice::cube_centre;
-use crate::parallel::{Filling, Gathering};
-use crate::points::reserve;
+use crate::parallel::{Filling, concatenated};
+use crate::points::starts;
 use crate::progress::Stage;
 use glam::Vec3;
 use std::mem::MaybeUninit;
+use std::ops::Range;
 
 /// A few points of one cube with nearly the same normal and plane.
 #[derive(Clone, Copy, Debug)]
@@ -24,9 +25,23 @@ pub(super) struct Patches {
     /// In the order of the cubes.
     pub all: Vec<Patch>,
     /// For each cube its first patch; one more at the end.
-    pub first: Vec<u32>,
-    /// For each point, as the grid sorts them, its place in one.
-    pub of_point: Vec<Membership>,
+    pub first: Vec<usize>,
+}
+
+/// The points of the patches, as the grid sorts them: 5 bytes each.
+pub(super) struct Members {
+    /// Which point of the input it is.
+    points: Vec<u32>,
+    of_point: Vec<Membership>,
+}
+
+impl Members {
+    /// The points of a cube.
+    pub fn of_cube(&self, grid: &Grid, cube: usize) -> impl Iterator<Item = (usize, Membership)> {
+        let range = grid.points_of(cube);
+        let points = self.points[range.clone()].iter().map(|&point| point as usize);
+        points.zip(self.of_point[range].iter().copied())
+    }
 }
 
 /// The patch of a point.
@@ -61,90 +76,47 @@ const THICKNESS: f32 = 0.1;
 const DEVIATIONS: f32 = 2.2;
 
 impl Patches {
-    /// One pass over the points; `noise` is that of [`noise`].
-    pub fn of(grid: &Grid, normals: &[Vec3], noise: f32, stage: &Stage) -> Result<Self, Error> {
+    /// One pass over the points; `noise` is theirs, in edges.
+    pub fn of(grid: &Grid, normals: &[Vec3], noise: f32, stage: &Stage) -> Result<(Self, Members), Error> {
+        const WHAT: &str = "the patches";
         let thickness = THICKNESS.max(DEVIATIONS * noise);
-        let of_point = Filling::new(grid.placed.len(), "the patches")?;
-        let counts = Filling::<u32>::new(grid.cubes(), "the patches")?;
-        let found = Gathering::new("the patches");
-        stage.run(grid.blocks.len(), &|block| {
+        let (numbers, of_point) = (Filling::new(grid.placed.len(), WHAT)?, Filling::new(grid.placed.len(), WHAT)?);
+        let counts = Filling::<u32>::new(grid.cubes(), WHAT)?;
+        let found = stage.collect(grid.blocks.len(), WHAT, &|block| {
             let (mut patches, mut order) = (Vec::new(), Vec::new());
             let bricks = grid.blocks[block].clone();
-            let start = grid.first_point[bricks.start] as usize;
-            let end = grid.first_point[bricks.end] as usize;
+            let points = grid.first_point[bricks.start] as usize..grid.first_point[bricks.end] as usize;
+            // SAFETY: a point belongs to one brick, and a brick to one block.
+            let (numbers, mut of_point) = unsafe { (numbers.slice(points.clone()), of_point.slice(points.clone())) };
+            for (number, placed) in numbers.iter_mut().zip(&grid.placed[points.clone()]) {
+                number.write(placed.point);
+            }
             // All at once, so that the processor waits for many places of memory at a time and not for one after the other.
-            let normals: Vec<Vec3> =
-                grid.placed[start..end].iter().map(|placed| normals[placed.point as usize]).collect();
+            let normals: Vec<Vec3> = grid.placed[points].iter().map(|placed| normals[placed.point as usize]).collect();
             let mut normals = &normals[..];
-            // SAFETY: a cube belongs to one brick, and a brick to one block.
-            let mut of_point = unsafe { of_point.slice(start..end) };
             for brick in bricks {
                 for (cube, (points, bit)) in (grid.first_cube[brick] as usize..).zip(grid.cubes_of(brick)) {
                     let before = patches.len();
-                    let (own, others) = normals.split_at(points.len());
-                    normals = others;
-                    let (memberships, others) = of_point.split_at_mut(points.len());
-                    of_point = others;
+                    let own = normals.split_off(..points.len()).unwrap_or_default();
+                    let memberships = of_point.split_off_mut(..points.len()).unwrap_or_default();
                     split(points, own, cube_centre(bit), thickness, &mut order, &mut patches, memberships);
-                    // SAFETY: as above.
+                    // SAFETY: a cube belongs to one brick.
                     unsafe { counts.write(cube, (patches.len() - before) as u32) };
                 }
             }
-            found.append(vec![(block, patches)]);
+            patches
         })?;
-        let mut found = found.all()?;
-        found.sort_unstable_by_key(|&(block, _)| block);
-        let mut all = Vec::new();
-        reserve(&mut all, found.iter().map(|(_, patches)| patches.len()).sum(), "the patches")?;
-        for (_, mut patches) in found {
-            all.append(&mut patches);
-        }
         // SAFETY: the blocks hold all bricks, these all cubes, and these all points.
-        let (counts, of_point) = unsafe { (counts.complete(), of_point.complete()) };
-        let mut first = Vec::new();
-        reserve(&mut first, counts.len() + 1, "the patches")?;
-        let mut total = 0;
-        first.push(0);
-        for count in counts {
-            total += count;
-            first.push(total);
-        }
-        Ok(Self { all, first, of_point })
+        let (counts, points, of_point) = unsafe { (counts.complete(), numbers.complete(), of_point.complete()) };
+        let patches = Self { all: concatenated(found, WHAT)?, first: starts(&counts, WHAT)? };
+        Ok((patches, Members { points, of_point }))
     }
-}
 
-/// How far points lie off their surface, in edges: the deviation that half of the cubes do not exceed. Looks at every eighth
-/// brick.
-///
-/// From how far apart points are along the normal, one next to the other: both sides of a thin wall in one cube are no noise.
-pub(super) fn noise(grid: &Grid, normals: &[Vec3]) -> f32 {
-    const STEP: usize = 8;
-    /// Fewer points lie on a plane in any case.
-    const LEAST: usize = 4;
-    /// Of normally distributed points, the median of the gaps between neighbours times the number of points, in deviations.
-    const GAPS: f32 = 2.2;
-    let (mut deviations, mut places) = (Vec::new(), Vec::new());
-    for brick in (0..grid.bricks.len()).step_by(STEP) {
-        for (points, _) in grid.cubes_of(brick).filter(|(points, _)| points.len() >= LEAST) {
-            let mut normal = Vec3::ZERO;
-            for point in points {
-                let own = normals[point.point as usize];
-                normal += if normal.dot(own) < 0.0 { -own } else { own };
-            }
-            let normal = normal.normalize_or_zero();
-            places.clear();
-            places.extend(points.iter().map(|point| point.local.dot(normal)));
-            places.sort_unstable_by(f32::total_cmp);
-            let mut gaps: Vec<f32> = places.windows(2).map(|pair| pair[1] - pair[0]).collect();
-            deviations.push(median(&mut gaps) * points.len() as f32 / GAPS);
-        }
+    /// The numbers of the patches of a cube.
+    #[inline(always)]
+    pub fn of_cube(&self, cube: usize) -> Range<usize> {
+        self.first[cube]..self.first[cube + 1]
     }
-    if deviations.is_empty() { 0.0 } else { median(&mut deviations) }
-}
-
-fn median(values: &mut [f32]) -> f32 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
 /// Parts the points of one cube; `normals` are theirs.

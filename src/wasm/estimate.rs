@@ -9,8 +9,8 @@ use wasm_bindgen::prelude::*;
 /// Estimates the normals of `x0 y0 z0 x1 ...`, 32-bit numbers or, if `double`, 64-bit ones. Consumes the buffer.
 ///
 /// Answers with an object of `normals`, a buffer of three 32-bit numbers for each point, of `curvature`, if asked for,
-/// with one, and of the `report`.
-#[wasm_bindgen(unchecked_return_type = "{ normals: Buffer, curvature?: Buffer, report: object }")]
+/// with one, of `components`, if asked for, with one whole number, and of the `report`.
+#[wasm_bindgen(unchecked_return_type = "{ normals: Buffer, curvature?: Buffer, components?: Buffer, report: object }")]
 pub fn estimate(
     positions: Buffer,
     double: bool,
@@ -19,7 +19,7 @@ pub fn estimate(
 ) -> Result<Object, JsValue> {
     call(tell, |progress| {
         let options = options::parse(options)?;
-        let Estimate { normals, curvature, report } = if double {
+        let Estimate { normals, curvature, components, report } = if double {
             let points = Points::from_f64(positions.numbers("positions", 3)?)?;
             // The points are a copy: what they were copied from is not needed any more.
             drop(positions);
@@ -31,6 +31,10 @@ pub fn estimate(
         set(&estimation, "normals", Buffer::from(normals));
         if let Some(curvature) = curvature {
             set(&estimation, "curvature", Buffer::from(curvature));
+        }
+        if let Some(components) = components {
+            // Four bytes are four bytes.
+            set(&estimation, "components", Buffer::from(bytemuck::cast_vec::<u32, f32>(components)));
         }
         set(&estimation, "report", describe(&report));
         Ok(estimation)
@@ -62,14 +66,17 @@ fn describe(report: &Report) -> Object {
     set(&object, "nodesUsed", array(&report.nodes_used));
     if let Some(components) = &report.components {
         let list = Array::new();
-        for component in components {
+        for component in &components.largest {
             let object = Object::new();
             set(&object, "points", component.points as f64);
             set(&object, "side", component.side.name());
             set(&object, "confidence", component.confidence);
             list.push(&object);
         }
-        set(&object, "components", list);
+        let components_of = Object::new();
+        set(&components_of, "count", components.count as f64);
+        set(&components_of, "largest", list);
+        set(&object, "components", components_of);
     }
     let milliseconds = Object::new();
     for &(phase, time) in &report.milliseconds {

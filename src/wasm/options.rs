@@ -6,7 +6,8 @@ use js_sys::{Array, JSON, Object, Reflect};
 use wasm_bindgen::prelude::*;
 
 /// Every option of `estimateNormals`. The last three are for the JavaScript side, which handles them.
-const NAMES: [&str; 8] = ["method", "cell", "k", "orient", "curvature", "transfer", "onProgress", "signal"];
+const NAMES: [&str; 9] =
+    ["method", "cell", "k", "orient", "curvature", "components", "transfer", "onProgress", "signal"];
 const METHODS: &str = "'bilinear', 'knn' or 'egg'";
 const CELLS: &str = "'auto', { scale: number } or { size: number }";
 const ORIENTS: &str = "'none', 'consistent', 'outward', { viewpoint: [x, y, z] } or { up: [x, y, z] }";
@@ -40,11 +41,14 @@ pub(super) fn parse(value: &JsValue) -> Result<Options, Error> {
         if let Some(orient) = given(value, "orient") {
             options.orient = self::orient(&orient).ok_or_else(|| refusal("orient", &orient, ORIENTS))?;
         }
+        options.components = flag(value, "components")?;
     }
-    if let Some(curvature) = given(value, "curvature") {
-        options.curvature = curvature.as_bool().ok_or_else(|| refusal("curvature", &curvature, "true or false"))?;
-    }
+    options.curvature = flag(value, "curvature")?;
     Ok(options)
+}
+
+fn flag(value: &JsValue, name: &str) -> Result<bool, Error> {
+    given(value, name).map_or(Ok(false), |flag| flag.as_bool().ok_or_else(|| refusal(name, &flag, "true or false")))
 }
 
 fn method(value: &JsValue) -> Option<Method> {

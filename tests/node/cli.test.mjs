@@ -84,6 +84,27 @@ test('the report tells what each kind of cells has to tell', () => {
   assert.doesNotMatch(fixed, /noise/);
 });
 
+test('--orient chooses the side, and the report tells of surfaces', () => {
+  const outwards = (name) => {
+    const [x, y, z, nx, ny, nz] = ['x', 'y', 'z', 'nx', 'ny', 'nz'].map(
+      (p) => propertyOf(written(name), 'vertex', p).values,
+    );
+    return x.filter((_, i) => x[i] * nx[i] + y[i] * ny[i] + z[i] * nz[i] > 0).length;
+  };
+  for (const [how, right, told] of [
+    ['consistent', 20000, /^surfaces +20,000 points outwards, 9\d % sure$/m],
+    ['outward', 20000, /^surfaces +20,000 points outwards/m],
+    ['viewpoint=0,0,0', 0, /^points/m],
+  ]) {
+    const { status, stdout } = run(['sphere.ply', '-o', 'turned.ply', '--orient', how]);
+    assert.equal(status, 0);
+    assert.equal(outwards('turned.ply'), right, how);
+    assert.match(stdout, told);
+  }
+  assert.equal(run(['sphere.ply', '-o', 'turned.ply', '--orient', 'up=0,0,-1', '--quiet']).status, 0);
+  assert.ok(propertyOf(written('turned.ply'), 'vertex', 'nz').values.every((nz) => nz <= 0));
+});
+
 test('--json prints the report as one line, --quiet nothing', () => {
   const { stdout } = run([
     'sphere.ply',

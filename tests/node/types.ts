@@ -40,7 +40,7 @@ export async function documented(file: File, response: Response): Promise<Blob> 
 export async function options(positions: Positions): Promise<void> {
   const all: EstimateOptions[] = [
     {},
-    { method: 'knn', k: 12, cell: 'auto', orient: 'consistent', curvature: true, transfer: true },
+    { method: 'knn', k: 12, cell: 'auto', orient: 'consistent', curvature: true, components: true, transfer: true },
     { method: 'egg', cell: { scale: 1.5 }, orient: { viewpoint: [0, 0, 1] } },
     {
       cell: { size: 0.02 },
@@ -54,7 +54,10 @@ export async function options(positions: Positions): Promise<void> {
     memoryMaxMiB: 512,
   });
   for (const one of all) {
-    const { normals, curvature } = await estimator.estimateNormals(positions, one);
+    const { normals, curvature, components, report } = await estimator.estimateNormals(positions, one);
+    for (const { points, side, confidence } of report.components?.largest ?? []) {
+      console.log(report.components?.count, points, side satisfies string, confidence, components?.indexOf(0));
+    }
     await estimator.writePly(new Blob(), { normals, curvature });
   }
   const found: Features = await estimator.features();

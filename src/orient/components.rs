@@ -1,0 +1,150 @@
+//! Which side of each surface is its outside.
+
+use super::air::Sights;
+use super::groups::{Signs, signed};
+use super::patches::Patches;
+use crate::error::Error;
+use crate::grid::Grid;
+use crate::lattice::{BRICK, cube_centre};
+use crate::points::{filled, reserve};
+use glam::DVec3;
+use std::cmp::Reverse;
+
+/// The surfaces of a cloud that got one sign each.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Components {
+    /// How many there are.
+    pub count: u64,
+    /// At most the thousand largest, the largest first.
+    pub largest: Vec<Component>,
+}
+
+/// One surface in itself: what is not linked to any other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Component {
+    /// Points of it.
+    pub points: u64,
+    /// What told its outside.
+    pub side: Side,
+    /// How much more speaks for that side than for the other: 0 is a guess, 1 is sure. By the air of all that is seen of the
+    /// open how much more is seen from that side; by volume how much there is, of that of a sphere.
+    pub confidence: f64,
+}
+
+/// What told the outside of a component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The open air: it lies on one side of the surface only.
+    Air,
+    /// The volume: both sides are open, or neither, and most of the normals point away from the middle of the surface.
+    Volume,
+    /// Nothing: the surface is open and flat. By convention `x + 2y + 4z >= 0` for its mean normal.
+    Convention,
+}
+
+impl Side {
+    /// In one word.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Air => "air",
+            Self::Volume => "volume",
+            Self::Convention => "convention",
+        }
+    }
+}
+
+/// Components that are told about.
+const TOLD: usize = 1000;
+
+/// Where one side sees hardly more of the open than the other, the air says nothing; nor where hardly any patch sees it at
+/// all: that is a gap in what hides it.
+const LEAST_AIR: f64 = 0.05;
+const LEAST_SIGHT: f64 = 0.01;
+
+/// With less volume a surface is flat, and its bulges are chance. A shallow dome has this if its height is a seventieth of its
+/// radius.
+const LEAST_VOLUME: f64 = 0.02;
+
+/// The convention: normals along it are positive.
+const POSITIVE: DVec3 = DVec3::new(1.0, 2.0, 4.0);
+
+/// Sums over a component, with its normals as they were signed.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    number: u32,
+    patches: u64,
+    points: u64,
+    place: DVec3,
+    normal: DVec3,
+    /// The sum of place . normal.
+    flux: f64,
+    exposure: f64,
+    sight: f64,
+    /// The sum of distances from the middle.
+    reach: f64,
+}
+
+impl Sums {
+    /// What told the outside, and whether the normals point inwards.
+    fn decide(&self) -> (Component, bool) {
+        let share = |part: f64, all: f64| if all > 0.0 { part / all } else { 0.0 };
+        let air = share(self.exposure, self.sight);
+        let volume = share(self.flux - self.place.dot(self.normal) / self.points as f64, self.reach);
+        let (side, evidence) = if air.abs() >= LEAST_AIR && self.sight >= LEAST_SIGHT * self.patches as f64 {
+            (Side::Air, air)
+        } else if volume.abs() >= LEAST_VOLUME {
+            (Side::Volume, volume)
+        } else {
+            let is_inwards = self.normal.dot(POSITIVE) < 0.0;
+            return (Component { points: self.points, side: Side::Convention, confidence: 0.0 }, is_inwards);
+        };
+        (Component { points: self.points, side, confidence: evidence.abs().min(1.0) }, evidence < 0.0)
+    }
+}
+
+/// Turns the components that face inwards, tells what decided and how sure that is, and numbers them by size.
+pub(super) fn decide(grid: &Grid, patches: &Patches, sights: &Sights, signs: &mut Signs) -> Result<Components, Error> {
+    const WHAT: &str = "the components";
+    let mut all = filled(Sums::default(), signs.components, WHAT)?;
+    let places = || {
+        (0..grid.blocks.len()).flat_map(|block| grid.cubes_in(block)).flat_map(|(brick, cube, bit)| {
+            let centre = f64::from(BRICK) * grid.bricks.places[brick].as_dvec3() + cube_centre(bit).as_dvec3();
+            patches.of_cube(cube).map(move |i| (i, centre + patches.all[i].centre.as_dvec3()))
+        })
+    };
+    for (i, place) in places() {
+        let (patch, sums) = (&patches.all[i], &mut all[signs.component[i] as usize]);
+        let points = f64::from(patch.points);
+        let normal = points * signed(signs.flipped[i], patch.normal).as_dvec3();
+        sums.number = signs.component[i];
+        sums.patches += 1;
+        sums.points += u64::from(patch.points);
+        sums.place += points * place;
+        sums.normal += normal;
+        sums.flux += place.dot(normal);
+        sums.exposure += f64::from(signed(signs.flipped[i], sights.exposure[i]));
+        sums.sight += f64::from(sights.all[i]);
+    }
+    for (i, place) in places() {
+        let sums = &mut all[signs.component[i] as usize];
+        sums.reach += f64::from(patches.all[i].points) * place.distance(sums.place / sums.points as f64);
+    }
+    all.sort_unstable_by_key(|sums| (Reverse(sums.points), sums.number));
+    let mut components = Components { count: all.len() as u64, largest: Vec::new() };
+    reserve(&mut components.largest, all.len().min(TOLD), WHAT)?;
+    // For each its number by size, and whether it faces inwards.
+    let mut decided = filled((0u32, false), all.len(), WHAT)?;
+    for (number, sums) in (0u32..).zip(&all) {
+        let (component, is_inwards) = sums.decide();
+        if components.largest.len() < TOLD {
+            components.largest.push(component);
+        }
+        decided[sums.number as usize] = (number, is_inwards);
+    }
+    for (flipped, component) in signs.flipped.iter_mut().zip(&mut signs.component) {
+        let (number, is_inwards) = decided[*component as usize];
+        *flipped ^= is_inwards;
+        *component = number;
+    }
+    Ok(components)
+}
