@@ -60,8 +60,11 @@ export async function openBrowser() {
   };
 }
 
-/** A binary PLY of a unit sphere, evenly covered in a random order; `colored` adds red, green, blue. */
-export function spherePly(points, { colored = false, centre = [0, 0, 0] } = {}) {
+/**
+ * A binary PLY of unit spheres, evenly covered in a random order, one point after the other on each in turn; `colored` adds
+ * red, green, blue.
+ */
+export function spherePly(points, { colored = false, centres = [[0, 0, 0]] } = {}) {
   const colors = colored ? 'property uchar red\nproperty uchar green\nproperty uchar blue\n' : '';
   const header = Buffer.from(
     `ply\nformat binary_little_endian 1.0\nelement vertex ${points}\n` +
@@ -76,6 +79,7 @@ export function spherePly(points, { colored = false, centre = [0, 0, 0] } = {}) 
     const z = 2 * random() - 1;
     const turn = 2 * Math.PI * random();
     const ring = Math.sqrt(1 - z * z);
+    const centre = centres[i % centres.length];
     file.writeFloatLE(centre[0] + ring * Math.cos(turn), at);
     file.writeFloatLE(centre[1] + ring * Math.sin(turn), at + 4);
     file.writeFloatLE(centre[2] + z, at + 8);

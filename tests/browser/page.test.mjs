@@ -331,7 +331,7 @@ test('towards the camera no back faces show, wherever it is, and after a flip th
   // A turn ends at once: the camera must stand still when it is asked where it is.
   page = await browser.openPage(browser.isolated, { reducedMotion: 'reduce' });
   // So that a camera in the coordinates of the view, which has its middle in the ball, would be on the other side.
-  await drop(page, 'ball.ply', spherePly(20_000, { centre: [-10, 4, -3] }));
+  await drop(page, 'ball.ply', spherePly(20_000, { centres: [[-10, 4, -3]] }));
   await result(page, 'ball.ply');
   await page.getByRole('radio', { name: 'Z', exact: true }).check();
   await page.mouse.move(400, 400);
@@ -388,6 +388,47 @@ test('a flip turns what is saved, again undoes it, and curvature keeps it', asyn
   await flip.click();
   assert.deepEqual((await oriented('Outward')).saved, before);
   assert.equal(await flip.getAttribute('aria-pressed'), 'false');
+});
+
+test('one surface is turned by a click, or by Enter in the middle of the view', async () => {
+  page = await browser.openPage(browser.isolated);
+  const left = [-1.5, 0, 0];
+  await drop(page, 'balls.ply', spherePly(40_000, { centres: [left, [1.5, 0, 0]] }));
+  await result(page, 'balls.ply');
+  const turn = page.getByRole('button', { name: 'Flip one' });
+  assert.ok(await turn.isDisabled());
+  const { saved: before, facts } = await oriented('Outward', 'balls.ply');
+  assert.match(facts, /\b2 surfaces/);
+  await turn.click();
+  assert.equal(await turn.getAttribute('aria-pressed'), 'true');
+
+  // A double click centres the view on a point of the left one, and turns it like a single one.
+  const canvas = page.locator('#canvas');
+  const { width, height } = await canvas.boundingBox();
+  const panel = await page.locator('#panel').evaluate(({ offsetWidth }) => offsetWidth);
+  const position = { x: (width - panel) / 2 - 0.2 * height, y: height / 2 };
+  await canvas.dblclick({ position });
+  const turned = before.map((value, i) => (i % 12 < 3 || i % 12 > 5 ? value : 0 - value));
+  assert.deepEqual(readSaved((await save(page)).bytes), turned);
+  assert.match(await page.locator('#facts').innerText(), /\b1 flipped by hand/);
+
+  // What is computed again for its curvature keeps that.
+  await page.getByRole('radio', { name: 'Curvature' }).check();
+  await result(page, 'balls.ply');
+  const bent = readSaved((await save(page)).bytes, 'curvature').filter((_, i) => i % 7 < 6);
+  assert.deepEqual(bent, turned);
+
+  await canvas.focus();
+  await page.keyboard.press('Enter');
+  const undone = readSaved((await save(page)).bytes, 'curvature').filter((_, i) => i % 7 < 6);
+  assert.deepEqual(undone, before);
+
+  // A drag moves the camera, and Escape ends it all.
+  await canvas.dragTo(canvas, { sourcePosition: position, targetPosition: { x: position.x + 40, y: position.y } });
+  await page.keyboard.press('Escape');
+  assert.equal(await turn.getAttribute('aria-pressed'), 'false');
+  await canvas.click({ position });
+  assert.doesNotMatch(await page.locator('#facts').innerText(), /by hand/);
 });
 
 test('the sides of the plinth of the sample face outwards', async () => {

@@ -25,6 +25,7 @@ function start(viewer: Viewer): void {
     sample: () => void session.openSample(),
     fit: () => viewer.fit(),
     flip: () => session.flip(),
+    turn: () => store.set({ turning: !store.state.turning }),
     save: () => void session.save(),
     cancel: () => session.cancel(),
     dismiss: () => store.set({ error: undefined }),
@@ -39,7 +40,10 @@ function start(viewer: Viewer): void {
     input.value = '';
   });
   addEventListener('keydown', (event) => {
-    if (event.key === 'Escape' && store.state.job) session.cancel();
+    if (event.key === 'Escape') {
+      if (store.state.job) session.cancel();
+      else store.set({ turning: false });
+    }
     const typing = event.target instanceof HTMLInputElement && event.target.type === 'text';
     if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.key === 'f') viewer.fit();
@@ -48,6 +52,7 @@ function start(viewer: Viewer): void {
 
   takeDrops(session);
   takeControls(session, viewer);
+  takeTurns(session, viewer);
 
   // On a small screen the panel would hide the cloud: it starts closed there.
   element<HTMLDetailsElement>('#panel').open = !small.matches;
@@ -89,6 +94,27 @@ function takeDrops(session: Session): void {
     const file = event.dataTransfer?.files[0];
     if (file) void session.open(file);
     else store.set({ error: 'That was not a file: drop a .ply file from a folder of this machine.' });
+  });
+}
+
+/** Clicks on a surface, and Enter for the one in the middle of the window, while surfaces are being turned. */
+function takeTurns(session: Session, viewer: Viewer): void {
+  /** A press that moves further, in pixels, moves the camera instead. */
+  const STILL = 4;
+  const canvas = element('#canvas');
+  const turn = (at?: { x: number; y: number }) => {
+    const { turning, job } = store.state;
+    const point = turning && !job ? viewer.pick(at) : -1;
+    if (point >= 0) session.flipSurface(point);
+  };
+  let pressed = { x: NaN, y: NaN };
+  canvas.addEventListener('pointerdown', ({ clientX: x, clientY: y }) => (pressed = { x, y }));
+  canvas.addEventListener('click', ({ clientX: x, clientY: y, detail }) => {
+    // The second click of two centres the view.
+    if (detail < 2 && Math.hypot(x - pressed.x, y - pressed.y) <= STILL) turn({ x, y });
+  });
+  canvas.addEventListener('keydown', ({ key }) => {
+    if (key === 'Enter') turn();
   });
 }
 

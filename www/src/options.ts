@@ -55,4 +55,7 @@ export function orientOf(kind: OrientKind, up: Up, eye: [number, number, number]
   return kind;
 }
 
+/** Whether the normals were given one sign for each surface. */
+export const hasSurfaces = (orient: Orient | undefined) => orient === 'consistent' || orient === 'outward';
+
 const numberOf = (text: string) => (text.trim() === '' ? NaN : Number(text.trim().replace(',', '.')));

@@ -1,7 +1,7 @@
 // Draws the state into the document. Nothing is remembered here: every part is a function of the state.
 import type { Report } from 'bilinormal';
 import { count, duration, measure, phaseName, plural } from './format';
-import { METHODS, parseOptions } from './options';
+import { METHODS, hasSurfaces, parseOptions } from './options';
 import type { State, Store } from './state';
 
 export function element<T extends HTMLElement>(selector: string): T {
@@ -53,12 +53,20 @@ export function showState(store: Store): void {
     const flip = element<HTMLButtonElement>('[data-do=flip]');
     flip.disabled = !scan?.hasNormals || busy;
     flip.setAttribute('aria-pressed', String(state.flipped));
+    const turn = element<HTMLButtonElement>('[data-do=turn]');
+    turn.disabled = !hasSurfaces(state.used?.orient) || busy;
+    turn.setAttribute('aria-pressed', String(state.turning));
+    document.documentElement.classList.toggle('turning', state.turning && !turn.disabled);
     element<HTMLButtonElement>('[data-do=save]').disabled = !scan?.hasNormals || busy;
 
     showOptions(state, busy);
     showError(error);
     showJob(state);
-    const told = before?.scan === scan && before?.report === report && before?.flipped === state.flipped;
+    const told =
+      before?.scan === scan &&
+      before?.report === report &&
+      before?.flipped === state.flipped &&
+      before?.turnedSurfaces === state.turnedSurfaces;
     if (!told) showResult(state);
   });
 }
@@ -133,19 +141,27 @@ function factsOf(report: Report, used: State['used']): HTMLElement[] {
   ];
 }
 
+/** Where the normals of a surface point to, and where they do once they are flipped. */
+const WAYS = {
+  air: ['outwards', 'inwards'],
+  volume: ['away from the middle', 'towards the middle'],
+  convention: ['to either side', 'to either side'],
+} as const;
+
 /** How the signs were chosen: for surfaces, the largest one and which way it faces. */
-function signsOf({ components, points }: Report, { used, flipped }: State): HTMLElement[] {
+function signsOf({ components, points }: Report, { used, flipped, turnedSurfaces }: State): HTMLElement[] {
   if (components) {
-    const [largest] = components;
-    const facts = [fact(count(components.length), components.length === 1 ? 'surface' : 'surfaces')];
+    const [largest] = components.largest;
+    const facts = [fact(count(components.count), components.count === 1 ? 'surface' : 'surfaces')];
     if (!largest) return facts;
     const { side, confidence } = largest;
-    const open = flipped ? 'inwards' : 'outwards';
-    const middle = flipped ? 'towards the middle' : 'away from the middle';
+    const [way, opposite] = WAYS[side];
+    const turned = turnedSurfaces.size;
     return [
       ...facts,
       fact(`${measure((100 * largest.points) / points)}%`, 'in the largest'),
-      fact(side === 'air' ? open : middle, `with confidence ${confidence.toFixed(2)}`),
+      fact(flipped === turnedSurfaces.has(0) ? way : opposite, `with confidence ${confidence.toFixed(2)}`),
+      ...(turned ? [fact(count(turned), 'flipped by hand')] : []),
     ];
   }
   if (typeof used?.orient !== 'object') return [];

@@ -2,9 +2,9 @@
 // viewer.setNormals -> report. One job runs at a time; a new one cancels it. Curvature is computed while it is shown.
 import { estimateNormals, readPointCloud, writePly, type EstimateOptions } from 'bilinormal';
 import { boundsOf, guessUp } from './bounds';
-import { METHODS, orientOf, parseOptions } from './options';
+import { METHODS, hasSurfaces, orientOf, parseOptions } from './options';
 import { colorsOf } from './ramp';
-import type { Store } from './state';
+import { UNTURNED, type Store, type Turned } from './state';
 import type { Viewer } from './viewer';
 
 export interface Session {
@@ -16,17 +16,21 @@ export interface Session {
   addCurvature(): Promise<void>;
   /** Turns all normals round, those on the screen and so those that are saved. */
   flip(): void;
+  /** Turns those of the surface round that a point belongs to. */
+  flipSurface(point: number): void;
   save(): Promise<void>;
   cancel(): void;
 }
 
 const SAMPLE_POINTS = 500_000;
+/** The surface of a point without a normal. */
+const NO_SURFACE = 0xffff_ffff;
 
 /** The cloud on the screen, and what was computed for it. */
 interface Shown {
   file: File;
   positions: Float32Array;
-  result?: { normals: Float32Array; curvature?: Float32Array };
+  result?: { normals: Float32Array; curvature?: Float32Array; components?: Uint32Array };
   /** What the result was computed with. */
   options?: EstimateOptions;
 }
@@ -92,7 +96,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
       scan,
       report: undefined,
       used: undefined,
-      flipped: false,
+      ...UNTURNED,
       up,
       shading,
       cellKind: 'auto',
@@ -104,10 +108,11 @@ export function createSession(store: Store, viewer: Viewer): Session {
     const parsed = parseOptions(store.state);
     if ('problem' in parsed) throw new Error(parsed.problem);
     const { orientKind, up } = store.state;
-    await shadeBy({ ...parsed.options, orient: orientOf(orientKind, up, viewer.eye()) }, false, step);
+    await shadeBy({ ...parsed.options, orient: orientOf(orientKind, up, viewer.eye()) }, UNTURNED, step);
   }
 
-  async function shadeBy(options: EstimateOptions, flipped: boolean, step: Step): Promise<void> {
+  /** `turned` is what a person turned by hand since it was computed last. */
+  async function shadeBy(options: EstimateOptions, turned: Turned, step: Step): Promise<void> {
     const { scan, shading } = store.state;
     if (!shown || !scan) return;
     const { method = 'bilinear', k = 0, orient = 'none' } = options;
@@ -116,15 +121,18 @@ export function createSession(store: Store, viewer: Viewer): Session {
     const { report, ...result } = await estimateNormals(shown.positions, {
       ...options,
       curvature,
+      components: hasSurfaces(orient),
       signal: step.signal,
       onProgress: step.begin(`Computing ${what}`),
     });
     step.signal.throwIfAborted();
+    const { flipped, turnedSurfaces } = turned;
     if (flipped) negate(result.normals);
+    for (const surface of turnedSurfaces) negate(result.normals, result.components, surface);
     shown = { ...shown, result, options };
     viewer.setNormals(result.normals, result.curvature && colorsOf(result.curvature));
     const hasCurvature = result.curvature !== undefined;
-    store.set({ scan: { ...scan, hasNormals: true, hasCurvature }, report, used: { method, k, orient }, flipped });
+    store.set({ scan: { ...scan, hasNormals: true, hasCurvature }, report, used: { method, k, orient }, ...turned });
   }
 
   return {
@@ -146,8 +154,8 @@ export function createSession(store: Store, viewer: Viewer): Session {
     async addCurvature() {
       const { result, options } = shown ?? {};
       if (!result || !options || result.curvature) return;
-      const { flipped } = store.state;
-      await run('Computing curvature', (step) => shadeBy(options, flipped, step));
+      const { flipped, turnedSurfaces } = store.state;
+      await run('Computing curvature', (step) => shadeBy(options, { flipped, turnedSurfaces }, step));
     },
 
     flip() {
@@ -157,11 +165,27 @@ export function createSession(store: Store, viewer: Viewer): Session {
       store.set({ flipped: !store.state.flipped });
     },
 
+    flipSurface(point) {
+      const { normals, components } = shown?.result ?? {};
+      const surface = components?.[point];
+      if (!normals || surface === undefined || surface === NO_SURFACE) return;
+      negate(normals, components, surface);
+      viewer.refreshNormals();
+      const turnedSurfaces = new Set(store.state.turnedSurfaces);
+      if (!turnedSurfaces.delete(surface)) turnedSurfaces.add(surface);
+      store.set({ turnedSurfaces });
+    },
+
     save: () =>
       run('Saving', async (step) => {
         if (!shown?.result) return;
         const { file, result } = shown;
-        const ply = await writePly(file, result, { signal: step.signal, onProgress: step.begin('Saving') });
+        const { normals, curvature } = result;
+        const ply = await writePly(
+          file,
+          { normals, ...(curvature && { curvature }) },
+          { signal: step.signal, onProgress: step.begin('Saving') },
+        );
         download(ply, `${file.name.replace(/\.[^.]*$/, '')}-normals.ply`);
       }),
 
@@ -173,9 +197,11 @@ export function createSession(store: Store, viewer: Viewer): Session {
   };
 }
 
-/** In place; a zero stays as it is, without a sign. */
-function negate(normals: Float32Array): void {
-  for (let i = 0; i < normals.length; i++) normals[i] = 0 - normals[i]!;
+/** In place: all, or those of one surface. A zero stays as it is, without a sign. */
+function negate(normals: Float32Array, components?: Uint32Array, surface?: number): void {
+  for (let i = 0; i < normals.length; i++) {
+    if (components?.[Math.floor(i / 3)] === surface) normals[i] = 0 - normals[i]!;
+  }
 }
 
 function makeSample(signal: AbortSignal): Promise<File> {

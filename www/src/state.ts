@@ -21,7 +21,17 @@ export interface Job {
   fraction: number | undefined;
 }
 
-export interface State extends OptionsForm {
+/** What was turned by hand, so that it points the other way than the report says. */
+export interface Turned {
+  /** All normals. */
+  flipped: boolean;
+  /** Those of single surfaces, besides. */
+  turnedSurfaces: ReadonlySet<number>;
+}
+
+export const UNTURNED: Turned = { flipped: false, turnedSurfaces: new Set() };
+
+export interface State extends OptionsForm, Turned {
   /** Whether files can be taken: false until the browser has been looked at. */
   ready: boolean;
   /** Why this browser cannot run the page at all. */
@@ -30,13 +40,13 @@ export interface State extends OptionsForm {
   report: Report | undefined;
   /** What the report is about. */
   used: { method: Method; k: number; orient: Orient } | undefined;
-  /** Whether all normals point the other way than the report says. */
-  flipped: boolean;
   job: Job | undefined;
   error: string | undefined;
   shading: Shading;
   /** Whether what points away from the camera has a colour of its own. */
   backs: boolean;
+  /** Whether a click turns the surface that it meets. */
+  turning: boolean;
   pointSize: number;
   up: Up;
 }
@@ -54,11 +64,12 @@ export function createStore(): Store {
     scan: undefined,
     report: undefined,
     used: undefined,
-    flipped: false,
+    ...UNTURNED,
     job: undefined,
     error: undefined,
     shading: 'shaded',
     backs: false,
+    turning: false,
     pointSize: 1,
     up: 'y',
     method: 'bilinear',

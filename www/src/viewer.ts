@@ -41,6 +41,8 @@ export interface Viewer {
   setUp(up: Up): void;
   /** Frames the whole cloud from the first point of view. */
   fit(): void;
+  /** Number of the point of the cloud at a place of the window, or in the middle of the view; -1 where there is none. */
+  pick(at?: { x: number; y: number }): number;
   /** Where the camera is, in the coordinates of the cloud's positions. */
   eye(): [number, number, number];
   /** Pixels at the edges that are covered: the cloud is framed in the rest. */
@@ -235,19 +237,24 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     request();
   }
 
-  function focus(event: MouseEvent): void {
-    if (!cloud) return;
+  function pick(at?: { x: number; y: number }): number {
+    if (!cloud) return -1;
     const box = canvas.getBoundingClientRect();
-    const x = ((event.clientX - box.left) / box.width) * 2 - 1;
-    const y = 1 - ((event.clientY - box.top) / box.height) * 2;
+    const behind = controls.target.clone();
+    if (at) {
+      const x = ((at.x - box.left) / box.width) * 2 - 1;
+      const y = 1 - ((at.y - box.top) / box.height) * 2;
+      behind.set(x, y, 0.5).unproject(camera);
+    }
     const eye = new Vector3(...viewer.eye());
-    const along = points
-      .worldToLocal(new Vector3(x, y, 0.5).unproject(camera))
-      .sub(eye)
-      .normalize();
+    const along = points.worldToLocal(behind).sub(eye).normalize();
     const slope = (6 / box.height) * 2 * Math.tan((camera.fov * Math.PI) / 360);
-    const index = pickPoint(cloud.positions, eye.toArray(), along.toArray(), slope);
-    if (index < 0) return;
+    return pickPoint(cloud.positions, eye.toArray(), along.toArray(), slope);
+  }
+
+  function focus(event: MouseEvent): void {
+    const index = pick({ x: event.clientX, y: event.clientY });
+    if (!cloud || index < 0) return;
     controls.target.copy(points.localToWorld(new Vector3().fromArray(cloud.positions, index * 3)));
     request();
   }
@@ -320,6 +327,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       request();
     },
     fit,
+    pick,
     eye() {
       points.updateWorldMatrix(true, false);
       return points.worldToLocal(camera.position.clone()).toArray();
