@@ -126,6 +126,34 @@ const RICH_NORMALS: [f32; 9] = [1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.6, 0.0, 0.8];
 
 // Reading
 
+/// After an element with lists, so that it is not at a place that is known beforehand.
+#[test]
+fn a_camera_is_where_the_scanner_stood() {
+    use V::*;
+    let with = |format: &str, properties: &[&str], rows: &[Vec<V>]| {
+        let mut header = format!(
+            "ply\nformat {format} 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n"
+        );
+        header += "element face 1\nproperty list uchar int vertex_indices\n";
+        header += &format!("element camera {}\n", rows.len());
+        for property in properties {
+            header += &format!("property {property}\n");
+        }
+        let before = [vec![F32(7.0), F32(8.0), F32(9.0)], vec![U8(2), I32(0), I32(0)]];
+        read([header.as_bytes(), b"end_header\n", &body(format, &[&before[..], rows].concat())].concat()).unwrap()
+    };
+    const CAMERA: [&str; 5] = ["list uchar int marks", "double view_py", "float view_px", "int k", "float view_pz"];
+    let row = |x: f32| vec![U8(1), I32(5), F64(-2.5), F32(x), I32(4), F32(1e3)];
+    for format in [TEXT, LITTLE, BIG] {
+        assert_eq!(with(format, &CAMERA, &[row(1.5)]).viewpoint, Some([1.5, -2.5, 1000.0]));
+        assert_eq!(with(format, &CAMERA, &[row(1.5), row(3.5)]).viewpoint, Some([1.5, -2.5, 1000.0]));
+        assert_eq!(with(format, &CAMERA, &[row(f32::NAN)]).viewpoint, None);
+        assert_eq!(with(format, &CAMERA, &[]).viewpoint, None);
+        assert_eq!(with(format, &["float view_px", "int view_py"], &[vec![F32(1.0), I32(2)]]).viewpoint, None);
+    }
+    assert_eq!(read(rich(TEXT)).unwrap().viewpoint, None);
+}
+
 #[test]
 fn all_formats_give_the_same_cloud() {
     for format in [TEXT, LITTLE, BIG] {

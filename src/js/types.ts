@@ -135,7 +135,16 @@ export interface PointCloud {
   /** Red, green, blue, alpha of each point. */
   colors?: Uint8Array;
   intensity?: Float32Array;
-  source: { format: string; properties: string[]; comments: string[] };
+  source: {
+    format: string;
+    properties: string[];
+    comments: string[];
+    /**
+     * Where the scanner stood, in the file's coordinates: `view_px view_py view_pz` of its element `camera`, as MeshLab and PCL
+     * write it. Less `origin` it is a viewpoint for `orient`.
+     */
+    viewpoint?: [number, number, number];
+  };
 }
 
 export interface ReadOptions {

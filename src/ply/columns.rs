@@ -79,7 +79,8 @@ pub(super) fn find(vertex: &Element) -> Result<Option<Vec<Column>>, Error> {
 }
 
 /// The plain number called `name`, or called so in other letter case.
-fn column(vertex: &Element, name: &[u8]) -> Option<Column> {
+#[inline(never)]
+pub(super) fn column(vertex: &Element, name: &[u8]) -> Option<Column> {
     let mut found = None;
     let mut offset = 0;
     for (property, declared) in vertex.properties.iter().enumerate() {

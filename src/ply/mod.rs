@@ -57,6 +57,9 @@ pub struct PointCloud {
     pub properties: Vec<String>,
     /// The texts of comments and `obj_info` lines.
     pub comments: Vec<String>,
+    /// Where the scanner stood, in the file's coordinates: `view_px view_py view_pz` of its element `camera`, as VCGlib (MeshLab)
+    /// and PCL write it.
+    pub viewpoint: Option<[f64; 3]>,
 }
 
 impl PointCloud {

@@ -44,7 +44,8 @@ pub fn read(file: &[u8], options: &ReadOptions, progress: &Progress) -> Result<P
         let count = vertex.count;
         return Err(Error::input(format_args!("the file declares {count} points; at most {most} were asked for")));
     }
-    let parts = Body::locate(&header, file)?.parts(index);
+    let body = Body::locate(&header, file)?;
+    let parts = body.parts(index);
     // Fits: there are as many rows in the file.
     let reader = Reader { vertex, columns: &columns, parts: &parts, count: vertex.count as usize };
     // Rows without lists and words are read column by column.
@@ -80,7 +81,24 @@ pub fn read(file: &[u8], options: &ReadOptions, progress: &Progress) -> Result<P
         format: header.format,
         properties: vertex.properties.iter().map(|property| decode(property.name)).collect(),
         comments: header.comments(),
+        viewpoint: viewpoint(&header, &body),
     })
+}
+
+/// The place of the first camera.
+#[optimize(size)]
+fn viewpoint(header: &Header, body: &Body) -> Option<[f64; 3]> {
+    let index = header.elements.iter().position(|element| element.name == b"camera")?;
+    let element = &header.elements[index];
+    let [x, y, z] = [b"view_px", b"view_py", b"view_pz"].map(|name| columns::column(element, name));
+    let columns = [x?, Column { component: 1, ..y? }, Column { component: 2, ..z? }];
+    let parts = body.parts(index);
+    let reader = Reader { vertex: element, columns: &columns, parts: &parts, count: 1 };
+    let mut place = [f64::NAN; 3];
+    let take = &mut |_: usize, column: &Column, value| place[column.component] = value;
+    // The step passes over all rows but the first.
+    reader.walk(parts.first()?, usize::MAX, take).ok()?;
+    place.iter().all(|c| c.is_finite()).then_some(place)
 }
 
 /// What is read, and from where.
@@ -108,6 +126,7 @@ impl Reader<'_> {
     }
 
     /// Calls back with each value that is read, in every `step`th row of the element.
+    #[inline(never)]
     fn walk(&self, part: &Part, step: usize, each: &mut dyn FnMut(usize, &Column, f64)) -> Result<(), Error> {
         let vertex = self.vertex;
         let mut columns_of = vec![None; vertex.properties.len()];

@@ -30,6 +30,9 @@ fn describe(cloud: PointCloud) -> Object {
     set(&source, "format", cloud.format.name());
     set(&source, "properties", array(&cloud.properties));
     set(&source, "comments", array(&cloud.comments));
+    if let Some(viewpoint) = cloud.viewpoint {
+        set(&source, "viewpoint", viewpoint.into_iter().map(JsValue::from).collect::<Array>());
+    }
     set(&object, "source", source);
     set(&object, "positions", Buffer::from(cloud.positions));
     for (name, values) in [("normals", cloud.normals), ("intensity", cloud.intensity)] {

@@ -47,6 +47,7 @@ pub fn write_cloud(
             colors: colors.map(|colors| colors.into_bytes("colors")).transpose()?,
             intensity: intensity.map(|intensity| intensity.into_floats("intensity", 1)).transpose()?,
             comments,
+            viewpoint: None,
             normals: None,
             format: Format::BinaryLittleEndian,
             properties: Vec::new(),

@@ -358,6 +358,39 @@ test('towards the camera no back faces show, wherever it is, and after a flip th
   assert.equal(await backsShown(page, square), 0);
 });
 
+test('where the file says that the scanner stood is offered as a viewpoint', async () => {
+  page = await browser.openPage(browser.isolated);
+  const ball = spherePly(20_000);
+  await drop(page, 'ball.ply', ball);
+  await result(page, 'ball.ply');
+  assert.ok(await orientation('Scanner').isHidden());
+  // From the middle of the ball all normals point inwards. Another comment names a size, and no place.
+  for (const [place, expected] of [
+    ['0, 0, 0', 1],
+    ['3 0 -1e30', 0.5],
+  ]) {
+    const comments = `comment camera position 640 480 1 1\ncomment Scanner position: ${place}\n`;
+    const file = Buffer.from(ball.toString('latin1').replace('element', `${comments}element`), 'latin1');
+    await drop(page, 'said.ply', file);
+    assert.equal((await result(page, 'said.ply')).error, undefined);
+    await orientation('Scanner').check();
+    await page.getByRole('button', { name: 'Re-run' }).click();
+    const { error } = await result(page, 'said.ply');
+    assert.equal(error, undefined);
+    assert.match(await page.locator('#facts').innerText(), /towards the scanner/);
+    const saved = readSaved((await save(page)).bytes);
+    const inwards = shareOf(
+      saved,
+      (point, normal) => -point[0] * normal[0] - point[1] * normal[1] - point[2] * normal[2],
+    );
+    assert.ok(Math.abs(inwards - expected) < 0.02, `${inwards} from ${place}`);
+  }
+  // A scan without one is not asked for it.
+  await drop(page, 'ball.ply', ball);
+  await result(page, 'ball.ply');
+  assert.ok(await orientation('As found').isChecked());
+});
+
 test('a flip turns what is saved, again undoes it, and curvature keeps it', async () => {
   page = await browser.openPage(browser.isolated);
   await drop(page, 'ball.ply', spherePly(20_000));

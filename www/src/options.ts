@@ -5,8 +5,9 @@ import type { Up } from './viewer';
 export type CellKind = 'auto' | 'scale' | 'size';
 export type Method = NonNullable<EstimateOptions['method']>;
 export type Orient = NonNullable<EstimateOptions['orient']>;
-/** Where the camera is and which way is up: known when the normals are computed. */
-export type OrientKind = 'none' | 'consistent' | 'outward' | 'camera' | 'up';
+/** Where the camera and the scanner are and which way is up: known when the normals are computed. */
+export type OrientKind = 'none' | 'consistent' | 'outward' | 'camera' | 'scanner' | 'up';
+type Place = [number, number, number];
 
 /** The controls; numbers as typed. */
 export interface OptionsForm {
@@ -48,9 +49,10 @@ export function parseOptions({ method, cellKind, cellText, kText }: OptionsForm)
   return { problem: 'An edge length is a number above 0, in the unit of the file.' };
 }
 
-/** The chosen orientation, for a cloud with this axis upwards that is seen from `eye`. */
-export function orientOf(kind: OrientKind, up: Up, eye: [number, number, number]): Orient {
+/** The chosen orientation, for a cloud with this axis upwards that is seen from `eye` and was scanned from `scanner`. */
+export function orientOf(kind: OrientKind, up: Up, eye: Place, scanner: Place | undefined): Orient {
   if (kind === 'camera') return { viewpoint: eye };
+  if (kind === 'scanner') return scanner ? { viewpoint: scanner } : 'none';
   if (kind === 'up') return { up: up === 'z' ? [0, 0, 1] : [0, 1, 0] };
   return kind;
 }

@@ -81,6 +81,7 @@ function showOptions(state: State, busy: boolean): void {
   const { method, cellKind, cellText, kText, scan } = state;
   check('method', method);
   check('orient', state.orientKind);
+  radio('orient', 'scanner').closest('label')!.hidden = !scan?.scanner;
   check('cell', cellKind);
   const parsed = parseOptions(state);
   const problem = 'problem' in parsed ? parsed.problem : '';
@@ -149,7 +150,7 @@ const WAYS = {
 } as const;
 
 /** How the signs were chosen: for surfaces, the largest one and which way it faces. */
-function signsOf({ components, points }: Report, { used, flipped, turnedSurfaces }: State): HTMLElement[] {
+function signsOf({ components, points }: Report, { scan, used, flipped, turnedSurfaces }: State): HTMLElement[] {
   if (components) {
     const [largest] = components.largest;
     const facts = [fact(count(components.count), components.count === 1 ? 'surface' : 'surfaces')];
@@ -166,7 +167,9 @@ function signsOf({ components, points }: Report, { used, flipped, turnedSurfaces
   }
   if (typeof used?.orient !== 'object') return [];
   if ('up' in used.orient) return [fact(flipped ? 'downwards' : 'upwards', 'throughout')];
-  return [fact(flipped ? 'away from the camera' : 'towards the camera', 'as it was')];
+  const way = flipped ? 'away from' : 'towards';
+  if (used.orient.viewpoint === scan?.scanner) return [fact(`${way} the scanner`, 'as the file says')];
+  return [fact(`${way} the camera`, 'as it was')];
 }
 
 function showResult(state: State): void {

@@ -4,6 +4,7 @@ import { estimateNormals, readPointCloud, writePly, type EstimateOptions } from 
 import { boundsOf, guessUp } from './bounds';
 import { METHODS, hasSurfaces, orientOf, parseOptions } from './options';
 import { colorsOf } from './ramp';
+import { scannerOf } from './scanner';
 import { UNTURNED, type Store, type Turned } from './state';
 import type { Viewer } from './viewer';
 
@@ -89,8 +90,10 @@ export function createSession(store: Store, viewer: Viewer): Session {
       hasColors,
       hasNormals: false,
       hasCurvature: false,
+      scanner: scannerOf(cloud),
       readMilliseconds,
     };
+    const { orientKind } = store.state;
     // An edge length belongs to the unit of the file before.
     store.set({
       scan,
@@ -101,14 +104,16 @@ export function createSession(store: Store, viewer: Viewer): Session {
       shading,
       cellKind: 'auto',
       cellText: '',
+      orientKind: orientKind === 'scanner' && !scan.scanner ? 'none' : orientKind,
     });
   }
 
   async function shade(step: Step): Promise<void> {
     const parsed = parseOptions(store.state);
     if ('problem' in parsed) throw new Error(parsed.problem);
-    const { orientKind, up } = store.state;
-    await shadeBy({ ...parsed.options, orient: orientOf(orientKind, up, viewer.eye()) }, UNTURNED, step);
+    const { orientKind, up, scan } = store.state;
+    const orient = orientOf(orientKind, up, viewer.eye(), scan?.scanner);
+    await shadeBy({ ...parsed.options, orient }, UNTURNED, step);
   }
 
   /** `turned` is what a person turned by hand since it was computed last. */

@@ -11,6 +11,8 @@ export interface Scan {
   hasColors: boolean;
   hasNormals: boolean;
   hasCurvature: boolean;
+  /** Where it was scanned from, if the file says so. */
+  scanner: [number, number, number] | undefined;
   readMilliseconds: number;
 }
 

@@ -1,0 +1,15 @@
+// Where a scan was taken from, if its file says so.
+import type { PointCloud } from 'bilinormal';
+
+/** Relative to the cloud's origin, as its positions are. */
+export function scannerOf({ source, origin }: PointCloud): [number, number, number] | undefined {
+  const place = source.viewpoint ?? source.comments.map(placeIn).find((found) => found !== undefined);
+  return place && [place[0] - origin[0], place[1] - origin[1], place[2] - origin[2]];
+}
+
+/** The numbers of a comment such as `scanner position: 1.5, 0, 2`; with more or fewer it means something else. */
+function placeIn(comment: string): [number, number, number] | undefined {
+  if (!/(scanner|sensor|camera)\W*(position|origin|location)|view\W?point/i.test(comment)) return undefined;
+  const [x, y, z, ...more] = (comment.match(/[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?/gi) ?? []).map(Number);
+  return x !== undefined && y !== undefined && z !== undefined && more.length === 0 ? [x, y, z] : undefined;
+}
