@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::number;
+use crate::order::{from_ordinal, ordinal};
 use crate::parallel::{self, Gathering};
 use crate::points::{Bounds, Bulk, Points};
 use crate::power::{exp2, log2};
@@ -31,9 +32,8 @@ const LEVELS: u32 = 10;
 /// points equal: 1.
 pub(crate) fn paper_edge(extent: DVec3, count: usize) -> f64 {
     let n = count.max(1) as f64;
-    let mut sides = extent.to_array();
-    sides.sort_unstable_by(f64::total_cmp);
-    let [thin, middle, long] = sides;
+    let (thin, long) = (extent.min_element(), extent.max_element());
+    let middle = extent.x.max(extent.y).min(extent.x.min(extent.y).max(extent.z));
     // Shares of the longest side, so that nothing over- or underflows.
     let (thin, middle) = (thin / long, middle / long);
     // By logarithms, which are needed below anyway: a cube root of its own is 2 KB of WebAssembly.
@@ -94,9 +94,11 @@ struct Probes {
 impl Probes {
     /// Halves the edge until the probes hold no more of the cloud than wanted.
     fn place(bulk: &Bulk, extent: f64, count: usize) -> Self {
-        let mut sample = bulk.sample.clone();
-        sample.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z)));
-        sample.dedup();
+        // As whole numbers, so that there is one sort of such triples in the module.
+        let mut sorted: Vec<[i64; 3]> = bulk.sample.iter().map(|p| p.to_array().map(ordinal)).collect();
+        sorted.sort_unstable();
+        sorted.dedup();
+        let sample: Vec<DVec3> = sorted.into_iter().map(|p| DVec3::from_array(p.map(from_ordinal))).collect();
         let wanted = (PROBED_POINTS / count as f64).max(1.0 / 64.0);
         let step = sample.len().div_ceil(PROBES).max(1);
         let mut probes = Self { origin: bulk.median, edge: extent, chosen: Vec::new(), filter: vec![0; 1024] };
@@ -141,14 +143,14 @@ impl Probes {
         // so the order in which the chunks come does not matter.
         let found = Gathering::new("the sampled points");
         parallel::each(points.chunks(), &|i| {
-            let mut codes: Vec<u64> = Vec::new();
+            let mut codes: Vec<i64> = Vec::new();
             for point in points.chunk(i) {
                 let (cube, place) = self.cube(point.as_dvec3());
                 if let Some(probe) = self.find(cube)
                     && point.is_finite()
                 {
                     let place = morton((place * f64::from(1 << LEVELS)).as_uvec3());
-                    codes.push(u64::from(probe) << (3 * LEVELS) | u64::from(place));
+                    codes.push(i64::from(probe) << (3 * LEVELS) | i64::from(place));
                 }
             }
             found.append(codes);

@@ -27,6 +27,7 @@ mod nodes;
 mod normals;
 mod number;
 mod options;
+mod order;
 mod orient;
 mod parallel;
 mod pca;

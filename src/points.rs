@@ -1,6 +1,7 @@
 //! Positions relative to a double-precision origin.
 
 use crate::error::Error;
+use crate::order::{from_ordinal, ordinal};
 use crate::parallel;
 use crate::power::{exp2, log2};
 use bytemuck::cast_slice;
@@ -204,9 +205,9 @@ impl Bulk {
             return bulk;
         }
         for axis in 0..3 {
-            let mut values: Vec<f64> = bulk.sample.iter().map(|p| p[axis]).collect();
-            values.sort_unstable_by(f64::total_cmp);
-            let quantile = |q: f64| values[((values.len() - 1) as f64 * q).round() as usize];
+            let mut values: Vec<i64> = bulk.sample.iter().map(|p| ordinal(p[axis])).collect();
+            values.sort_unstable();
+            let quantile = |q: f64| from_ordinal(values[((values.len() - 1) as f64 * q).round() as usize]);
             bulk.median[axis] = quantile(0.5);
             bulk.extent = bulk.extent.max(quantile(0.95) - quantile(0.05));
         }
