@@ -98,6 +98,28 @@ fn closed_surfaces_face_outwards_whatever_the_method() {
     }
 }
 
+/// Their edges alone would say that one of them faces inwards: along the seam the surface goes on from one to the other.
+#[test]
+fn bodies_that_touch_or_cross_all_face_outwards() {
+    for distance in [2.0, 1.8, 1.2] {
+        let both = joined([sphere(50_000, 28), moved(sphere(50_000, 29), [distance, 0.0, 0.0], 1.0)]);
+        // What lies inside the other one has no outside.
+        let is_outside = |p: &[f32]| {
+            let square = |x: f32| x * x + p[1] * p[1] + p[2] * p[2];
+            square(p[0]).max(square(p[0] - distance as f32)) > 1.001
+                && square(p[0]).min(square(p[0] - distance as f32)) > 0.99
+        };
+        for how in [Orient::Consistent, Orient::Outward] {
+            let normals = orient(&both.points, how).normals;
+            let seen = both.points.chunks_exact(3).zip(normals.chunks_exact(3)).zip(&both.normals);
+            let (normals, truth): (Vec<&[f32]>, Vec<[f64; 3]>) =
+                seen.filter(|((p, _), _)| is_outside(p)).map(|((_, n), truth)| (n, *truth)).unzip();
+            let right = share_right(&normals.concat(), &truth);
+            assert!(right > 0.99, "{distance} apart, {how:?}: {right}");
+        }
+    }
+}
+
 #[test]
 fn noise_flips_next_to_nothing() {
     for (name, cloud, least) in [
@@ -105,6 +127,7 @@ fn noise_flips_next_to_nothing() {
         ("torus", torus(100_000, 12).noisy(0.006, 2), 0.9995),
         ("cube", cube(100_000, 13).noisy(0.012, 3), 0.998),
         ("plate", plate(100_000, 14, 0.1).noisy(0.0012, 4), 0.999),
+        ("thin plate", plate(100_000, 14, 0.06).noisy(0.0012, 4), 0.999),
     ] {
         let right = share_right(&orient(&cloud.points, Orient::Consistent).normals, &cloud.normals);
         assert!(right >= least, "{name}: {right}");

@@ -1,19 +1,20 @@
-//! One sign for each patch: groups of them that agree, merged from the strongest evidence to the weakest, then mended.
+//! The signs that agree best with all evidence: of groups, merged from the strongest evidence to the weakest, then of what
+//! they consist of.
 
 use super::links::{GRAPH, Link, Links};
 use crate::error::Error;
-use crate::points::{filled, reserve, starts};
+use crate::points::{filled, starts};
 use crate::power::exp2;
 use crate::progress::Stage;
 use std::ops::Neg;
 
-/// The signs of all patches, and which of them hang together.
-pub(super) struct Signs {
-    /// For each patch whether its normal must be flipped.
-    pub flipped: Vec<bool>,
+/// Groups of patches that agree, groups of such groups, and so on, up to the components, which nothing links any more.
+pub(super) struct Groups {
+    levels: Vec<Level>,
+    /// For each component, what speaks for its sign by itself.
+    own: Vec<f32>,
     /// For each patch the number of its component.
     pub component: Vec<u32>,
-    pub components: usize,
 }
 
 /// The groups of one step, and to which group of the next each belongs.
@@ -29,48 +30,72 @@ struct Level {
     flipped: Vec<bool>,
 }
 
-/// Chooses the signs that make the sum of all evidence large: of the links between two patches, and `exposure`, what
-/// speaks for a patch not to be flipped.
-///
-/// Rounds of Boruvka's: every group merges with the one that it has the strongest evidence for or against, and the evidence
-/// between the merged ones is added up, so that many weak links outvote a strong wrong one. A round at least halves the
-/// groups that have evidence enough to merge, and few get it later: linear in the links but for odd clouds, and never more
-/// than [`ROUNDS`] times as long. Then back from the last to the first: whatever gains by being flipped is.
-///
-/// What speaks for the patches of a group adds up like its area, the evidence of its neighbours only like its rim. Beyond
-/// `span` patches the former is made to grow like the rim too.
-pub(super) fn signs(links: Links, exposure: &[f32], span: f32, stage: &Stage) -> Result<Signs, Error> {
-    let patches = links.len();
-    let mut levels = Vec::new();
-    let (mut links, mut sizes) = (links, filled(1, patches, GRAPH)?);
-    let mut own = Vec::new();
-    reserve(&mut own, patches, GRAPH)?;
-    own.extend_from_slice(exposure);
-    let mut component = filled(0u32, patches, GRAPH)?;
-    component.iter_mut().zip(0..).for_each(|(component, one)| *component = one);
-    let mut count = patches;
-    for _ in 0..ROUNDS {
-        stage.tell(0.7 * (1.0 - count as f64 / patches as f64))?;
-        let Some(Merging { group, flipped, groups }) = merge(&links, &sizes)? else { break };
-        stage.tell(0.7 * (1.0 - (count + groups) as f64 / 2.0 / patches as f64))?;
-        let (merged, sums) = gather(&links, &own, &group, &flipped, groups)?;
-        let mut counts = filled(0, groups, GRAPH)?;
-        group.iter().zip(&sizes).for_each(|(&group, &size)| counts[group as usize] += size);
-        component.iter_mut().for_each(|component| *component = group[*component as usize]);
-        levels.push(Level {
-            links: std::mem::replace(&mut links, merged),
-            own: std::mem::replace(&mut own, sums),
-            sizes: std::mem::replace(&mut sizes, counts),
-            group,
-            flipped,
-        });
-        count = groups;
+impl Groups {
+    /// Rounds of Boruvka's: every group merges with the one that it has the strongest evidence for or against, and the
+    /// evidence between the merged ones is added up, so that many weak links outvote a strong wrong one. `exposure` is what
+    /// speaks for a patch not to be flipped. A round at least halves the groups that have evidence enough to merge, and few
+    /// get it later: linear in the links but for odd clouds, and never more than [`ROUNDS`] times as long.
+    pub fn of(mut links: Links, exposure: &[f32], stage: &Stage) -> Result<Self, Error> {
+        let patches = links.len();
+        let mut levels = Vec::new();
+        let (mut own, mut component) = (filled(0.0, patches, GRAPH)?, filled(0u32, patches, GRAPH)?);
+        let mut sizes = filled(1, patches, GRAPH)?;
+        own.copy_from_slice(exposure);
+        component.iter_mut().zip(0..).for_each(|(component, one)| *component = one);
+        for _ in 0..ROUNDS {
+            let done = |groups: usize| 1.0 - groups as f64 / patches as f64;
+            stage.tell(done(own.len()))?;
+            let Some(Merging { group, flipped, groups }) = merge(&links, &sizes)? else { break };
+            stage.tell(done((own.len() + groups) / 2))?;
+            let (merged, sums) = gather(&links, &own, &group, &flipped, groups)?;
+            let mut counts = filled(0, groups, GRAPH)?;
+            group.iter().zip(&sizes).for_each(|(&group, &size)| counts[group as usize] += size);
+            component.iter_mut().for_each(|component| *component = group[*component as usize]);
+            levels.push(Level {
+                links: std::mem::replace(&mut links, merged),
+                own: std::mem::replace(&mut own, sums),
+                sizes: std::mem::replace(&mut sizes, counts),
+                group,
+                flipped,
+            });
+        }
+        Ok(Self { levels, own, component })
     }
-    // From the last level to the first; `trust` is the weight of what speaks for a sign by itself.
-    let descend = |trust: f32, stage: &Stage| -> Result<Vec<bool>, Error> {
-        let mut flipped = filled(false, own.len(), GRAPH)?;
-        flipped.iter_mut().zip(&own).for_each(|(flipped, own)| *flipped = *own < 0.0);
-        for (number, Level { links, own, sizes, group, flipped: within }) in levels.iter().enumerate().rev() {
+
+    /// How many components there are.
+    pub fn components(&self) -> usize {
+        self.own.len()
+    }
+
+    /// Whether to flip each patch, so that the sum of all evidence becomes large. What speaks for the patches of a group adds
+    /// up like its area, the evidence of its neighbours only like its rim: beyond `span` patches the former is made to grow
+    /// like the rim too. Linear in the links.
+    pub fn signs(&self, span: f32, stage: &Stage) -> Result<Vec<bool>, Error> {
+        let mut flipped = self.descend(span, 1.0, &stage.part(0.0..0.4))?;
+        let Some(Level { links, own, .. }) = self.levels.first() else { return Ok(flipped) };
+        // Flipping one small group after the other does not reach a far better choice behind worse ones, as where both
+        // sides of a thin noisy wall were taken for one.
+        let bold = self.descend(span, BOLDNESS, &stage.part(0.4..0.8))?;
+        let mut gains = filled(0.0, self.components(), GRAPH)?;
+        for (one, &component) in self.component.iter().enumerate() {
+            gains[component as usize] += score(links, own, &bold, one) - score(links, own, &flipped, one);
+        }
+        for ((flipped, bold), &component) in flipped.iter_mut().zip(bold).zip(&self.component) {
+            if gains[component as usize] > 0.0 {
+                *flipped = bold;
+            }
+        }
+        mend(links, &|one| own[one], &mut flipped)?;
+        stage.tell(1.0)?;
+        Ok(flipped)
+    }
+
+    /// From the components to the patches: whatever gains by being flipped is. `trust` is the weight of what speaks for a sign
+    /// by itself.
+    fn descend(&self, span: f32, trust: f32, stage: &Stage) -> Result<Vec<bool>, Error> {
+        let mut flipped = filled(false, self.own.len(), GRAPH)?;
+        flipped.iter_mut().zip(&self.own).for_each(|(flipped, own)| *flipped = *own < 0.0);
+        for (number, Level { links, own, sizes, group, flipped: within }) in self.levels.iter().enumerate().rev() {
             // Each level has about twice as many groups as the next.
             stage.tell(exp2(-(number as f64)))?;
             let mut finer = filled(false, group.len(), GRAPH)?;
@@ -82,25 +107,7 @@ pub(super) fn signs(links: Links, exposure: &[f32], span: f32, stage: &Stage) ->
             mend(links, &share, &mut flipped)?;
         }
         Ok(flipped)
-    };
-    let mut flipped = descend(1.0, &stage.part(0.7..0.8))?;
-    if let Some(Level { links, own, .. }) = levels.first() {
-        // Flipping one small group after the other does not reach a far better choice behind worse ones, as where both
-        // sides of a thin noisy wall were taken for one.
-        let bold = descend(BOLDNESS, &stage.part(0.8..0.95))?;
-        let mut gains = filled(0.0, count, GRAPH)?;
-        for (one, &component) in component.iter().enumerate() {
-            gains[component as usize] += score(links, own, &bold, one) - score(links, own, &flipped, one);
-        }
-        for ((flipped, bold), &component) in flipped.iter_mut().zip(bold).zip(&component) {
-            if gains[component as usize] > 0.0 {
-                *flipped = bold;
-            }
-        }
-        mend(links, &|one| own[one], &mut flipped)?;
     }
-    stage.tell(1.0)?;
-    Ok(Signs { flipped, component, components: count })
 }
 
 /// Groups that agree no better than this, for each patch along the side of a square of as many as the smaller has, only touch:

@@ -19,9 +19,9 @@ use crate::options::{Options, Orient};
 use crate::parallel::{self, Scatter};
 use crate::points::{Bounds, CHUNK, Points, filled};
 use crate::progress::Stage;
-use components::decide;
+use components::{Signs, decide};
 use glam::{DVec3, Vec3};
-use groups::Signs;
+use groups::Groups;
 use links::Links;
 use patches::{Members, Patches};
 
@@ -35,10 +35,6 @@ pub(crate) struct Surfaces {
 /// The component of a point without a normal.
 const NONE: u32 = u32::MAX;
 
-/// How many patches of a group count fully for what lies in the open. Few: an open box, or the corner of a room, is seen from
-/// its wrong side too, and its edges must outweigh that; at most as many as a spike has.
-const SPAN: f32 = 4.0;
-
 /// Turns the normals of all points as `options.orient` asks; answers for surfaces what was decided for each.
 ///
 /// Towards a position or a direction: one pass over the points. Otherwise linear in the points; besides these and the normals
@@ -50,22 +46,20 @@ pub(crate) fn orient(
     options: &Options,
     stage: &Stage,
 ) -> Result<Option<Surfaces>, Error> {
-    let span = match options.orient {
-        Orient::None => return Ok(None),
+    match options.orient {
+        Orient::None => Ok(None),
         Orient::Viewpoint(viewpoint) => {
             // Within what three times as much can be added up of.
             let viewpoint = ((DVec3::from(viewpoint) - points.origin) / points.unit).clamp(-FARTHEST, FARTHEST);
-            return face(points, normals, &|point| viewpoint - point.as_dvec3(), stage).map(|()| None);
+            face(points, normals, &|point| viewpoint - point.as_dvec3(), stage).map(|()| None)
         }
         Orient::Up(up) => {
             // Of length about 1, so that no product vanishes.
             let up = DVec3::from(up) / DVec3::from(up).abs().max_element();
-            return face(points, normals, &|_| up, stage).map(|()| None);
+            face(points, normals, &|_| up, stage).map(|()| None)
         }
-        Orient::Consistent => SPAN,
-        Orient::Outward => f32::INFINITY,
-    };
-    surfaces(points, normals, bounds, span, options.components, stage).map(Some)
+        Orient::Consistent | Orient::Outward => surfaces(points, normals, bounds, options, stage).map(Some),
+    }
 }
 
 const FARTHEST: DVec3 = DVec3::splat(1e300);
@@ -90,13 +84,12 @@ fn face(
     })
 }
 
-/// One sign for each surface, outwards. Up to `span` patches what lies in the open counts by area.
+/// One sign for each surface, outwards.
 fn surfaces(
     points: &Points,
     normals: &mut [Vec3],
     bounds: &Bounds,
-    span: f32,
-    tell: bool,
+    options: &Options,
     stage: &Stage,
 ) -> Result<Surfaces, Error> {
     let (mut grid, noise) = cubes::sort(points, normals, bounds, &stage.part(0.0..0.35))?;
@@ -105,9 +98,14 @@ fn surfaces(
     grid.placed = Vec::new();
     let sights = air::sights(&grid, &patches, points.len(), &stage.part(0.5..0.55))?;
     let links = Links::of(&grid, &patches, noise, &stage.part(0.55..0.7))?;
-    let mut signs = groups::signs(links, &sights.exposure, span, &stage.part(0.7..0.95))?;
+    let groups = Groups::of(links, &sights.exposure, &stage.part(0.7..0.85))?;
+    let choice = stage.part(0.85..0.95);
+    let mut signs = match options.orient {
+        Orient::Outward => Signs::outward(groups, &choice)?,
+        _ => Signs::consistent(groups, &sights, &choice)?,
+    };
     let components = decide(&grid, &patches, &sights, &mut signs)?;
-    let of_point = turn(&grid, &patches, &members, &signs, normals, tell, &stage.part(0.95..1.0))?;
+    let of_point = turn(&grid, &patches, &members, &signs, normals, options.components, &stage.part(0.95..1.0))?;
     Ok(Surfaces { components, of_point })
 }
 
