@@ -104,7 +104,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
       shading,
       cellKind: 'auto',
       cellText: '',
-      orientKind: orientKind === 'scanner' && !scan.scanner ? 'none' : orientKind,
+      orientKind: orientKind === 'scanner' && !scan.scanner ? 'consistent' : orientKind,
     });
   }
 

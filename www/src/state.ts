@@ -78,7 +78,7 @@ export function createStore(): Store {
     cellKind: 'auto',
     cellText: '',
     kText: '',
-    orientKind: 'none',
+    orientKind: 'consistent',
   };
   const listeners: ((state: Readonly<State>) => void)[] = [];
   return {
