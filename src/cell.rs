@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::number;
-use crate::order::{from_ordinal, ordinal};
+use crate::order::{from_ordinal, ordinal, sort};
 use crate::parallel::{self, Gathering};
 use crate::points::{Bounds, Bulk, Points};
 use crate::power::{exp2, log2};
@@ -24,6 +24,8 @@ const PROBED_POINTS: f64 = 32768.0;
 
 /// Halvings of a probe's edge that 'auto' counts.
 const LEVELS: u32 = 10;
+/// A number for a probe's edge, and for that halved 1 to [`LEVELS`] times.
+type Levels = [f64; LEVELS as usize + 1];
 
 /// The paper's L (Eq. 1) for `count` points in a box with sides `extent`: the edge of as many cubes as points.
 ///
@@ -52,39 +54,62 @@ pub(crate) fn edge_of_size(size: f64, unit: f64) -> Result<f64, Error> {
     Err(Error::input(format_args!("cell.size is {size}, out of all proportion to the cloud; wanted another")))
 }
 
-/// The edge that puts `wanted` points into an occupied cube.
-///
-/// The mean of 1 / (points in the cube of a point), taken over all points, is the share of occupied cubes in points.
-/// So a few points chosen at random ("probes") tell it without bias, whatever the extent of the cloud: the cubes round
-/// them are halved until they hold too few points. Stray points weigh as little as they are few.
-/// Costs one pass over the points.
-pub(crate) fn populated_edge(points: &Points, bounds: &Bounds, bulk: &Bulk, wanted: f64) -> Result<f64, Error> {
-    let extent = if bulk.extent > 0.0 { bulk.extent } else { bounds.extent().max_element() };
-    if extent <= 0.0 || bulk.sample.is_empty() {
-        // One point, or hardly any that is finite.
-        return Ok(paper_edge(bounds.extent(), bounds.finite));
+/// How densely the bulk of a cloud is covered.
+pub(crate) struct Density {
+    /// The middle of the bulk.
+    pub middle: DVec3,
+    /// Points of the cloud.
+    count: usize,
+    /// The edge of the first cubes.
+    edge: f64,
+    /// Points in an occupied cube of that edge, and of halves of it; 0 for one point, or hardly any that is finite.
+    occupancy: Levels,
+}
+
+impl Density {
+    /// One pass over the points.
+    ///
+    /// The mean of 1 / (points in the cube of a point), taken over all points, is the share of occupied cubes in points.
+    /// So a few points chosen at random ("probes") tell it without bias, whatever the extent of the cloud: the cubes round
+    /// them are halved until they hold too few points. Stray points weigh as little as they are few.
+    #[optimize(size)]
+    pub fn of(points: &Points, bounds: &Bounds) -> Result<Self, Error> {
+        let bulk = Bulk::of_points(points);
+        let extent = if bulk.extent > 0.0 { bulk.extent } else { bounds.extent().max_element() };
+        let count = bounds.finite;
+        if extent <= 0.0 || bulk.sample.is_empty() {
+            let edge = paper_edge(bounds.extent(), count);
+            return Ok(Self { middle: bulk.median, count, edge, occupancy: [0.0; LEVELS as usize + 1] });
+        }
+        let probes = Probes::place(&bulk, extent, count);
+        Ok(Self { middle: bulk.median, count, edge: probes.edge, occupancy: probes.count(points)? })
     }
-    let probes = Probes::place(bulk, extent, bounds.finite);
-    let counts = probes.count(points)?;
-    // Points that coincide can't be told apart by any edge, so they count as one.
-    let wanted = wanted.min(bounds.finite as f64 / LEAST_CELLS).max(LEAST_POINTS_PER_CELL);
-    let target = wanted * counts[LEVELS as usize];
-    let Some(level) = counts.iter().position(|&count| count < target) else {
-        return Ok(probes.edge);
-    };
-    if level == 0 {
-        // A probe is too small already. On a surface the points of a cube grow with its edge squared.
-        return Ok(probes.edge * (target / counts[0]).sqrt());
+
+    /// The edge of cubes that hold about `wanted` points each.
+    #[optimize(size)]
+    pub fn edge(&self, wanted: f64) -> f64 {
+        // Points that coincide can't be told apart by any edge, so they count as one.
+        let wanted = wanted.min(self.count as f64 / LEAST_CELLS).max(LEAST_POINTS_PER_CELL);
+        let target = wanted * self.occupancy[LEVELS as usize];
+        let Some(level) = self.occupancy.iter().position(|&count| count < target) else {
+            return self.edge;
+        };
+        if level == 0 {
+            // A probe is too small already. On a surface the points of a cube grow with its edge squared.
+            return self.edge * (target / self.occupancy[0]).sqrt();
+        }
+        let (coarse, fine) = (self.occupancy[level - 1], self.occupancy[level]);
+        let share = log2(coarse / target) / log2(coarse / fine);
+        self.edge * exp2(1.0 - level as f64 - share)
     }
-    let (coarse, fine) = (counts[level - 1], counts[level]);
-    let share = log2(coarse / target) / log2(coarse / fine);
-    Ok(probes.edge * exp2(1.0 - level as f64 - share))
 }
 
 /// Cubes of one grid that hold a chosen point each, with the number of chosen points in them.
 struct Probes {
     origin: DVec3,
     edge: f64,
+    /// 1 / edge.
+    scale: f64,
     /// Sorted by cube.
     chosen: Vec<([i64; 3], u32)>,
     /// A bit for each of 2^16 hashes of a cube: turns most points away at once.
@@ -93,6 +118,7 @@ struct Probes {
 
 impl Probes {
     /// Halves the edge until the probes hold no more of the cloud than wanted.
+    #[optimize(size)]
     fn place(bulk: &Bulk, extent: f64, count: usize) -> Self {
         // As whole numbers, so that there is one sort of such triples in the module.
         let mut sorted: Vec<[i64; 3]> = bulk.sample.iter().map(|p| p.to_array().map(ordinal)).collect();
@@ -101,9 +127,11 @@ impl Probes {
         let sample: Vec<DVec3> = sorted.into_iter().map(|p| DVec3::from_array(p.map(from_ordinal))).collect();
         let wanted = (PROBED_POINTS / count as f64).max(1.0 / 64.0);
         let step = sample.len().div_ceil(PROBES).max(1);
-        let mut probes = Self { origin: bulk.median, edge: extent, chosen: Vec::new(), filter: vec![0; 1024] };
+        let mut probes =
+            Self { origin: bulk.median, edge: extent, scale: 0.0, chosen: Vec::new(), filter: vec![0; 1024] };
         for halvings in 0..64 {
             probes.edge = extent * exp2(-f64::from(halvings));
+            probes.scale = 1.0 / probes.edge;
             let mut cubes: Vec<[i64; 3]> = sample.iter().step_by(step).map(|p| probes.cube(*p).0).collect();
             cubes.sort_unstable();
             probes.chosen = cubes.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as u32)).collect();
@@ -122,7 +150,7 @@ impl Probes {
 
     /// The cube of a point, and where in the cube the point lies, in 0 to 1.
     fn cube(&self, point: DVec3) -> ([i64; 3], DVec3) {
-        let place = (point - self.origin) / self.edge;
+        let place = (point - self.origin) * self.scale;
         let floor = place.floor();
         (floor.as_i64vec3().to_array(), place - floor)
     }
@@ -138,7 +166,8 @@ impl Probes {
     }
 
     /// Points in an occupied cube for the probes' edge halved 0 to [`LEVELS`] times.
-    fn count(&self, points: &Points) -> Result<Vec<f64>, Error> {
+    #[optimize(size)]
+    fn count(&self, points: &Points) -> Result<Levels, Error> {
         // The probe of each point, then a Morton code: points in one cube of any level share the first bits. Sorted below,
         // so the order in which the chunks come does not matter.
         let found = Gathering::new("the sampled points");
@@ -156,20 +185,27 @@ impl Probes {
             found.append(codes);
         });
         let mut found = found.all()?;
-        found.sort_unstable();
+        sort(&mut found);
 
-        let mut share = vec![0.0; LEVELS as usize + 1];
+        let mut share = [0.0; LEVELS as usize + 1];
         let mut chosen = 0.0;
         for probe in found.chunk_by(|a, b| a >> (3 * LEVELS) == b >> (3 * LEVELS)) {
             let weight = f64::from(self.chosen[(probe[0] >> (3 * LEVELS)) as usize].1);
             chosen += weight;
-            for (level, share) in share.iter_mut().enumerate() {
-                let shift = 3 * (LEVELS - level as u32);
-                let occupied = probe.chunk_by(|a, b| a >> shift == b >> shift).count();
-                *share += weight * occupied as f64 / probe.len() as f64;
+            // How many neighbours in their order part at each level.
+            let mut parted = [0; LEVELS as usize + 1];
+            for pair in probe.windows(2) {
+                if let Some(bit) = (pair[0] ^ pair[1]).checked_ilog2() {
+                    parted[(LEVELS - bit / 3) as usize] += 1;
+                }
+            }
+            let mut occupied = 1;
+            for (share, parted) in share.iter_mut().zip(parted) {
+                occupied += parted;
+                *share += weight * f64::from(occupied) / probe.len() as f64;
             }
         }
-        Ok(share.into_iter().map(|share| chosen / share).collect())
+        Ok(share.map(|share| chosen / share))
     }
 }
 
@@ -183,7 +219,13 @@ fn hash(cube: [i64; 3]) -> usize {
 
 /// Interleaves the lowest [`LEVELS`] bits of three numbers.
 fn morton(place: UVec3) -> u32 {
-    let spread = |value: u32| (0..LEVELS).map(|bit| (value >> bit & 1) << (3 * bit)).sum::<u32>();
+    // Ever smaller halves move apart, until there are two free bits before each.
+    let spread = |value: u32| {
+        let halves = (value | value << 16) & 0x0300_00FF;
+        let quarters = (halves | halves << 8) & 0x0300_F00F;
+        let pairs = (quarters | quarters << 4) & 0x030C_30C3;
+        (pairs | pairs << 2) & 0x0924_9249
+    };
     let place = place.min(UVec3::splat((1 << LEVELS) - 1));
     spread(place.x) | spread(place.y) << 1 | spread(place.z) << 2
 }

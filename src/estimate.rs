@@ -3,7 +3,7 @@
 use crate::adaptive;
 use crate::baseline::{self, Baseline, Tree};
 use crate::bilinear;
-use crate::cell;
+use crate::cell::{self, Density};
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::lattice::{CUBES, Lattice};
@@ -105,11 +105,16 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     let bounds = Bounds::of(points);
     laps.end("bounds");
 
+    let density = || {
+        first.update("cellSize", 0.03)?;
+        Density::of(points, &bounds)
+    };
     if !cfg!(feature = "full") {
-        return adaptive(points, options, &bounds, laps);
+        return adaptive(points, options, &bounds, &density()?, laps);
     }
+    let mut known = None;
     let mut estimate = match (options.method, options.cell) {
-        (Method::Bilinear, Cell::Auto) => adaptive(points, options, &bounds, laps),
+        (Method::Bilinear, Cell::Auto) => adaptive(points, options, &bounds, known.insert(density()?), laps),
         (Method::Bilinear, Cell::Scale(scale)) => {
             bilinear(points, options, scale * cell::paper_edge(bounds.extent(), bounds.finite), &bounds, laps)
         }
@@ -126,7 +131,7 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     if options.orient != Orient::None {
         let mut laps = Laps::start(progress);
         let normals = bytemuck::cast_slice_mut(&mut estimate.normals);
-        let surfaces = orient(points, normals, &bounds, options, &progress.stage("orientation", share..1.0))?;
+        let surfaces = orient(points, normals, &bounds, known, options, &progress.stage("orientation", share..1.0))?;
         if let Some(surfaces) = surfaces {
             estimate.components = surfaces.of_point;
             estimate.report.components = Some(surfaces.components);
@@ -152,15 +157,18 @@ fn describe(points: &Points, bounds: &Bounds, lattice: &Lattice, found: &Found, 
 }
 
 /// Cubes of the sizes that the cloud asks for.
-fn adaptive(points: &Points, options: &Options, bounds: &Bounds, mut laps: Laps) -> Result<Estimate, Error> {
+fn adaptive(
+    points: &Points,
+    options: &Options,
+    bounds: &Bounds,
+    density: &Density,
+    mut laps: Laps,
+) -> Result<Estimate, Error> {
     let progress = laps.progress;
-    progress.update("cellSize", 0.03)?;
-    let bulk = Bulk::of_points(points);
-    let edge = cell::populated_edge(points, bounds, &bulk, cell::POINTS_PER_CELL)?;
-    let lattice = Lattice::new(bounds, &|| bulk.median, edge, adaptive::CUBES);
+    let lattice = Lattice::new(bounds, &|| density.middle, density.edge(cell::POINTS_PER_CELL), adaptive::CUBES);
     laps.end("cellSize");
     let lap = &mut |phase| laps.end(phase);
-    let answer = adaptive::normals(points, &lattice, bulk.median.as_vec3(), options.curvature, progress, lap)?;
+    let answer = adaptive::normals(points, &lattice, density.middle.as_vec3(), options.curvature, progress, lap)?;
     let mut report = describe(points, bounds, &lattice, &answer.found, laps);
     report.cells = answer.cubes;
     report.nodes = answer.surfaces;

@@ -1,4 +1,5 @@
-//! Numbers as whole numbers of the same order: sorting code is large, and so there need not be any for each type.
+//! The order of numbers: as whole numbers, for which there is one sort, small and fast in WebAssembly, where the library's is
+//! small and slow.
 
 /// The place of a number among all numbers: NaN last, and 0 after -0.
 pub(crate) fn ordinal(number: f64) -> i64 {
@@ -15,6 +16,26 @@ fn mirror(bits: i64) -> i64 {
     bits ^ (bits >> 63 & i64::MAX)
 }
 
+/// Sorts by eight bits after eight, in linear time.
+#[optimize(size)]
+pub(crate) fn sort(numbers: &mut Vec<i64>) {
+    let mut sorted = vec![0; numbers.len()];
+    for shift in (0..64).step_by(8) {
+        // Negative numbers come first.
+        let digit = |number: i64| ((number ^ i64::MIN) >> shift) as usize & 255;
+        let mut next = [0; 256];
+        let mut total = 0;
+        numbers.iter().for_each(|&number| next[digit(number)] += 1);
+        next.iter_mut().for_each(|next| total += std::mem::replace(next, total));
+        for &number in &*numbers {
+            let next = &mut next[digit(number)];
+            sorted[*next] = number;
+            *next += 1;
+        }
+        std::mem::swap(numbers, &mut sorted);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -25,5 +46,19 @@ mod tests {
         assert!(numbers.map(ordinal).is_sorted_by(|a, b| a < b));
         assert!(ordinal(f64::INFINITY) < ordinal(f64::NAN));
         assert_eq!(numbers.map(ordinal).map(from_ordinal).map(f64::to_bits), numbers.map(f64::to_bits));
+    }
+
+    #[test]
+    fn sorted_are_all_numbers_of_all_sizes() {
+        let mut numbers: Vec<i64> = (0..2000).map(|i: i64| i.wrapping_mul(0x9E37_79B9_7F4A_7C15_u64 as i64)).collect();
+        numbers.extend([0, -1, 1, i64::MIN, i64::MAX, 255, 256, -256, 7, 7, 7]);
+        for shift in [0, 20, 56, 63] {
+            let mut found: Vec<i64> = numbers.iter().map(|number| number >> shift).collect();
+            let mut expected = found.clone();
+            expected.sort_unstable();
+            sort(&mut found);
+            assert_eq!(found, expected);
+        }
+        sort(&mut vec![]);
     }
 }

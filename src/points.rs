@@ -1,7 +1,7 @@
 //! Positions relative to a double-precision origin.
 
 use crate::error::Error;
-use crate::order::{from_ordinal, ordinal};
+use crate::order::{from_ordinal, ordinal, sort};
 use crate::parallel;
 use crate::power::{exp2, log2};
 use bytemuck::cast_slice;
@@ -206,8 +206,8 @@ impl Bulk {
         }
         for axis in 0..3 {
             let mut values: Vec<i64> = bulk.sample.iter().map(|p| ordinal(p[axis])).collect();
-            values.sort_unstable();
-            let quantile = |q: f64| from_ordinal(values[((values.len() - 1) as f64 * q).round() as usize]);
+            sort(&mut values);
+            let quantile = |q: f64| from_ordinal(values[((values.len() - 1) as f64 * q + 0.5) as usize]);
             bulk.median[axis] = quantile(0.5);
             bulk.extent = bulk.extent.max(quantile(0.95) - quantile(0.05));
         }

@@ -1,11 +1,11 @@
 //! The cubes whose points are parted into patches: so large that a noisy surface is no thicker than one.
 
-use crate::cell;
+use crate::cell::Density;
 use crate::error::Error;
 use crate::grid::{Grid, Placed};
 use crate::lattice::{CUBES, Lattice};
 use crate::median::median;
-use crate::points::{Bounds, Bulk, Points, spread};
+use crate::points::{Bounds, Points, spread};
 use crate::progress::Stage;
 use glam::Vec3;
 
@@ -18,14 +18,19 @@ const ENLARGEMENT: f64 = 1.25;
 const ENLARGEMENTS: u32 = 3;
 
 /// The cubes, and the noise in their edges. Sorts the points once, noisy ones up to four times.
-pub(super) fn sort(points: &Points, normals: &[Vec3], bounds: &Bounds, stage: &Stage) -> Result<(Grid, f32), Error> {
-    let bulk = Bulk::of_points(points);
-    let mut edge = cell::populated_edge(points, bounds, &bulk, POINTS_PER_CELL)?;
+pub(super) fn sort(
+    points: &Points,
+    normals: &[Vec3],
+    bounds: &Bounds,
+    density: &Density,
+    stage: &Stage,
+) -> Result<(Grid, f32), Error> {
+    let mut edge = density.edge(POINTS_PER_CELL);
     let mut enlargements = 0;
     loop {
         let start = f64::from(enlargements) / f64::from(ENLARGEMENTS + 1);
         let own = stage.part(start..start + 1.0 / f64::from(ENLARGEMENTS + 1));
-        let lattice = Lattice::new(bounds, &|| bulk.median, edge, CUBES);
+        let lattice = Lattice::new(bounds, &|| density.middle, edge, CUBES);
         let (grid, _) = Grid::sort(points, &lattice, &own, |_, _| ())?;
         let noise = noise(&grid, normals);
         if noise <= LARGEST_NOISE || enlargements == ENLARGEMENTS {

@@ -13,6 +13,7 @@ mod patches;
 
 pub use components::{Component, Components, Side};
 
+use crate::cell::Density;
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::options::{Options, Orient};
@@ -35,7 +36,8 @@ pub(crate) struct Surfaces {
 /// The component of a point without a normal.
 const NONE: u32 = u32::MAX;
 
-/// Turns the normals of all points as `options.orient` asks; answers for surfaces what was decided for each.
+/// Turns the normals of all points as `options.orient` asks; answers for surfaces what was decided for each. `density` is that of
+/// the points, if it is known.
 ///
 /// Towards a position or a direction: one pass over the points. Otherwise linear in the points; besides these and the normals
 /// some 32 bytes for each on smooth surfaces, 75 in vegetation, 190 where there is no surface at all.
@@ -43,6 +45,7 @@ pub(crate) fn orient(
     points: &Points,
     normals: &mut [Vec3],
     bounds: &Bounds,
+    density: Option<Density>,
     options: &Options,
     stage: &Stage,
 ) -> Result<Option<Surfaces>, Error> {
@@ -58,7 +61,10 @@ pub(crate) fn orient(
             let up = DVec3::from(up) / DVec3::from(up).abs().max_element();
             face(points, normals, &|_| up, stage).map(|()| None)
         }
-        Orient::Consistent | Orient::Outward => surfaces(points, normals, bounds, options, stage).map(Some),
+        Orient::Consistent | Orient::Outward => {
+            let density = density.map_or_else(|| Density::of(points, bounds), Ok)?;
+            surfaces(points, normals, bounds, &density, options, stage).map(Some)
+        }
     }
 }
 
@@ -89,10 +95,11 @@ fn surfaces(
     points: &Points,
     normals: &mut [Vec3],
     bounds: &Bounds,
+    density: &Density,
     options: &Options,
     stage: &Stage,
 ) -> Result<Surfaces, Error> {
-    let (mut grid, noise) = cubes::sort(points, normals, bounds, &stage.part(0.0..0.35))?;
+    let (mut grid, noise) = cubes::sort(points, normals, bounds, density, &stage.part(0.0..0.35))?;
     let (patches, members) = Patches::of(&grid, normals, noise, &stage.part(0.35..0.5))?;
     // Half of all the memory, and only its order is needed from here on.
     grid.placed = Vec::new();
