@@ -4,10 +4,10 @@
 
 import { existsSync, mkdirSync, writeFileSync } from 'node:fs';
 import { availableParallelism } from 'node:os';
-import { join, resolve } from 'node:path';
+import { join } from 'node:path';
 import { parseArgs } from 'node:util';
 import { build } from '../scripts/build.mjs';
-import { Failure, main, root, tell } from '../scripts/run.mjs';
+import { Failure, fromUser, main, root, tell } from '../scripts/run.mjs';
 import { setup } from '../scripts/setup.mjs';
 import { FULL, chosenRows, measureAll, plannedRows } from './accuracy/measure.mjs';
 import { readMeshes } from './accuracy/meshes.mjs';
@@ -15,9 +15,6 @@ import { details, report } from './accuracy/report.mjs';
 import { machine } from './machine.mjs';
 
 const OPTIONS = { meshes: { type: 'string' }, out: { type: 'string' }, rows: { type: 'string' } };
-
-/** npm changes into the project's folder; names are meant from where the user stands. */
-const fromUser = (path) => path && resolve(process.env.INIT_CWD ?? '.', path);
 
 function choose(rows, names) {
   try {

@@ -2,10 +2,10 @@
 // docs/paper.md with its charts and pictures. With --small it takes seconds, and says little.
 
 import { existsSync } from 'node:fs';
-import { join, resolve } from 'node:path';
+import { join } from 'node:path';
 import { parseArgs } from 'node:util';
 import { build } from '../scripts/build.mjs';
-import { Failure, main, root, tell } from '../scripts/run.mjs';
+import { Failure, fromUser, main, root, tell } from '../scripts/run.mjs';
 import { setup } from '../scripts/setup.mjs';
 import { FULL, SMALL } from './paper/experiments.mjs';
 import { reproduce } from './paper/reproduce.mjs';
@@ -16,9 +16,6 @@ const OPTIONS = {
   small: { type: 'boolean', default: false },
   'no-pictures': { type: 'boolean', default: false },
 };
-
-/** npm changes into the project's folder; names are meant from where the user stands. */
-const fromUser = (path) => path && resolve(process.env.INIT_CWD ?? '.', path);
 
 await main(async () => {
   const { values } = parseArgs({ options: OPTIONS });

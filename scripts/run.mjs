@@ -4,11 +4,14 @@
 
 import { execFileSync, spawnSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
-import { delimiter, join } from 'node:path';
+import { delimiter, join, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
 export const root = fileURLToPath(new URL('..', import.meta.url));
 export const tools = join(root, '.tools');
+
+/** The path that a user means: npm changes into the project's folder, and names are meant from where the user stands. */
+export const fromUser = (path) => path && resolve(process.env.INIT_CWD ?? '.', path);
 
 export const read = (path) => readFileSync(join(root, path), 'utf8');
 

@@ -99,7 +99,7 @@ function first(values, value) {
 }
 
 /** `{ vertices, triangles }`: places, and three indices each. */
-export function readMesh(bytes) {
+function readMesh(bytes) {
   const { format, elements, end } = header(bytes);
   const has = (name) => elements.some((element) => element.name === name);
   if (!has('face') && !has('tristrips')) throw new Error('no faces');

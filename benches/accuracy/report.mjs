@@ -1,11 +1,10 @@
 // Rows to text: docs/accuracy.md.
 
-import { count, percent, table } from '../paper/format.mjs';
+import { count, paragraphs, percent, sources, table } from '../paper/format.mjs';
 import { VARIANTS } from './clouds.mjs';
 import { LIMITS } from './judge.mjs';
 import { ALL, ENOUGH, JET, KNN, LEAST, METHODS, NEIGHBOURS, RUNS, geometricMean } from './measure.mjs';
 
-const paragraphs = (...parts) => parts.filter(Boolean).join('\n\n');
 const degrees = (value) => (value < 9.95 ? value.toFixed(2) : value.toFixed(1));
 const times = (value) => value.toFixed(2);
 const variants = Object.keys(VARIANTS);
@@ -42,7 +41,7 @@ export function report(rows, { machine, threads, minutes, sampled, hasFolder, sk
     columns(shapes),
     '## As PCPNet’s table: meshes',
     meshes.length > 0 ? columns(meshes) : meshNote(hasFolder),
-    sources(meshes, skipped),
+    sources('The meshes:', new Map(meshes.map(({ name, about }) => [name, about])), skipped),
     ...measured.flatMap((variant) => [
       `## ${LABELS[variant]}`,
       ...details(rows.filter((row) => row.variant === variant)),
@@ -126,18 +125,6 @@ function columns(rows) {
 
 const meshNote = (hasFolder) =>
   hasFolder ? 'No file of the folder is a mesh.' : 'Skipped: no meshes; none were given (`--meshes FOLDER`).';
-
-function sources(meshes, skipped) {
-  const about = new Map(meshes.map(({ name, about }) => [name, about]));
-  const credits = [...about].filter(([, text]) => text).map(([name, text]) => `- ${name}: ${text}`);
-  const others = skipped.map(({ name, reason }) => `- ${name}: ${reason}`);
-  return paragraphs(
-    credits.length > 0 && 'The meshes:',
-    credits.join('\n'),
-    others.length > 0 && 'Files of the folder that were not measured:',
-    others.join('\n'),
-  );
-}
 
 /** Two tables for the rows of one variant: errors of all methods; and auto and the best k more closely. */
 export function details(rows) {

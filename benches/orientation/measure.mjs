@@ -107,8 +107,11 @@ function once(job) {
   return () => (result ??= job());
 }
 
-/** Measures every row; `tell` hears what is being measured. `estimator` has one thread. */
-export async function measureAll(estimator, rows, { tell }) {
+/**
+ * Measures every row; `tell` hears what is being measured. `estimator` has one thread. `peers(row, cloud)`: what others reach
+ * on it.
+ */
+export async function measureAll(estimator, rows, { tell, peers }) {
   await warmUp(estimator);
   const results = [];
   for (const { cloud, walls, ...row } of rows) {
@@ -126,7 +129,8 @@ export async function measureAll(estimator, rows, { tell }) {
       const { components } = report;
       modes[mode] = { signs, components: components.count, largest: components.largest[0], seconds };
     }
-    results.push({ ...row, points: positions.length / 3, modes });
+    const others = row.sides && (await peers?.(row, { positions, normals: truth }));
+    results.push({ ...row, points: positions.length / 3, modes, ...(others && { peers: others }) });
   }
   return results;
 }

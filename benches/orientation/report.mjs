@@ -1,10 +1,9 @@
 // Rows to text: docs/orientation-bench.md.
 
-import { percent, table } from '../paper/format.mjs';
+import { paragraphs, percent, sources, table } from '../paper/format.mjs';
 import { MOST_SECONDS, counted, verdicts } from './judge.mjs';
 import { ENOUGH, MODES, RUNS, THICK } from './measure.mjs';
 
-const paragraphs = (...parts) => parts.filter(Boolean).join('\n\n');
 /** Never rounded up: all right is told from nearly all. */
 const share = (value) => `${value === 1 ? '100' : (Math.floor(1e5 * value + 1e-6) / 1e3).toFixed(3)} %`;
 const asPercent = (value) => `${Number((100 * value).toFixed(1))} %`;
@@ -14,7 +13,7 @@ const fullName = ({ name, variant }) => `${name}, ${variant}`;
 const side = ({ side, confidence }) => `${side} ${confidence.toFixed(2)}`;
 
 /** The whole text. `skipped`: files of the folder that were not measured; `notes`: what was done to others, by name. */
-export function report(rows, { machine, minutes, hasFolder, skipped, notes, peers }) {
+export function report(rows, { machine, minutes, hasFolder, skipped, notes }) {
   const { model, cores, node, date } = machine;
   return `${paragraphs(
     '# Orientation, measured',
@@ -26,8 +25,10 @@ export function report(rows, { machine, minutes, hasFolder, skipped, notes, peer
     '## Each row',
     details(rows),
     withoutSides(rows),
-    peers && paragraphs('## Beside others', beside(rows, peers)),
-    hasFolder ? sources(rows, skipped, notes) : 'Skipped: no meshes; none were given (`--meshes FOLDER`).',
+    beside(rows),
+    hasFolder
+      ? sources('The meshes and scans:', aboutOf(rows, notes), skipped)
+      : 'Skipped: no meshes; none were given (`--meshes FOLDER`).',
   )}\n`;
 }
 
@@ -139,54 +140,49 @@ export function withoutSides(rows) {
   );
 }
 
-/** `peers`: as `readPeers` gives them. All up to one flip, which is all that they promise. */
-function beside(rows, peers) {
-  const methods = [...new Set(peers.map(({ method }) => method))];
-  const names = rows.filter((row) => row.sides && peers.some((peer) => peer.row === rowName(row)));
-  const cell = (row, method) => {
-    const found = peers.find((peer) => peer.row === rowName(row) && peer.method === method);
-    if (!found) return '';
-    return Number.isFinite(found.share) ? `${share(found.share)}, ${found.seconds.toFixed(1)} s` : 'no answer';
+/** What others reach, where they were asked. All up to one flip, which is all that they promise. */
+export function beside(rows) {
+  const asked = rows.filter(({ peers }) => peers);
+  if (asked.length === 0) return '';
+  const methods = asked[0].peers.map(({ method }) => method);
+  const cell = ({ share: right, seconds, failure }) => failure ?? `${share(right)}, ${seconds.toFixed(2)} s`;
+  const own = (row, mode) => {
+    const { signs, seconds } = row.modes[mode];
+    return { share: signs.all.eitherWay, seconds: (seconds.total * row.points) / 1e6 };
   };
+  const best = (row) => row.peers.reduce((a, b) => ((b.share ?? 0) > (a.share ?? 0) ? b : a));
+  const isMet = (row) => own(row, MODES[0]).share >= (best(row).share ?? 0);
+  const median = (values) => values.toSorted((a, b) => a - b)[Math.floor(values.length / 2)];
+  const speeds = methods.map((method) => {
+    const ratios = asked.flatMap((row) => {
+      const { seconds } = row.peers.find((peer) => peer.method === method);
+      return seconds ? [seconds / own(row, MODES[0]).seconds] : [];
+    });
+    const [low, high] = [Math.min(...ratios), Math.max(...ratios)].map((ratio) => ratio.toPrecision(2));
+    return ratios.length
+      ? `${method}: ${median(ratios).toPrecision(2)} times (${low} to ${high})`
+      : `${method}: no answer`;
+  });
   return paragraphs(
-    'Shares up to one flip of all signs, and the seconds for the cloud on one thread, normals included; by benches/peers/orientation.py.',
+    '## Beside others',
+    'Shares up to one flip of all signs, and the seconds for the cloud on one thread, normals included, measured in this run, one after the other; by benches/peers/orientation.py, which says what their numbers mean. Ours are of WebAssembly, theirs are native.',
+    `At least as many right as the best of them: ${asked.filter(isMet).length} of ${asked.length} rows. Their time over ours, 'consistent', in the median and from the least to the most: ${speeds.join('; ')}. Asked are 100 times Open3D and 20 times MeshLib.`,
     table(
-      ['row', ...MODES, ...methods],
-      names.map((row) => [
+      ['row', ...MODES, ...methods, 'at least the best'],
+      asked.map((row) => [
         fullName(row),
-        ...MODES.map((mode) => {
-          const { signs, seconds } = row.modes[mode];
-          return `${share(signs.all.eitherWay)}, ${((seconds.total * row.points) / 1e6).toFixed(1)} s`;
-        }),
-        ...methods.map((method) => cell(row, method)),
+        ...MODES.map((mode) => cell(own(row, mode))),
+        ...row.peers.map(cell),
+        verdict(isMet(row)),
       ]),
     ),
   );
 }
 
-/** The name of a row in files. */
-export const rowName = ({ name, variant }) => `${name}-${variant}`.replaceAll(' ', '_');
-
-/** What benches/peers/orientation.py writes -> `[{ row, method, share, seconds }]`; a share that is no number: it failed. */
-export function readPeers(text) {
-  const [head, ...body] = text.trimEnd().split('\n');
-  if (head !== 'row\tmethod\tshare\tseconds')
-    throw new Error(`begins with "${head}"; wanted row, method, share, seconds`);
-  return body.map((line) => {
-    const [row, method, share, seconds] = line.split('\t');
-    return { row, method, share: Number(share), seconds: Number(seconds) };
-  });
-}
-
-function sources(rows, skipped, notes) {
-  const measured = new Map(rows.filter(({ kind }) => kind !== 'shape').map(({ name, about }) => [name, about]));
-  const texts = [...measured].map(([name, about]) => [name, [about, notes.get(name)].filter(Boolean).join('; ')]);
-  const credits = texts.filter(([, text]) => text).map(([name, text]) => `- ${name}: ${text}`);
-  const others = skipped.map(({ name, reason }) => `- ${name}: ${reason}`);
-  return paragraphs(
-    credits.length > 0 && 'The meshes and scans:',
-    credits.join('\n'),
-    others.length > 0 && 'Files of the folder that were not measured:',
-    others.join('\n'),
+/** What is known of each mesh and scan, by name. */
+const aboutOf = (rows, notes) =>
+  new Map(
+    rows
+      .filter(({ kind }) => kind !== 'shape')
+      .map(({ name, about }) => [name, [about, notes.get(name)].filter(Boolean).join('; ')]),
   );
-}

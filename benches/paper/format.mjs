@@ -29,3 +29,18 @@ export function table(head, rows) {
   const line = (cells) => `| ${cells.join(' | ')} |`;
   return [line(head), line(head.map((_, i) => (i === 0 ? '---' : '--:'))), ...rows.map(line)].join('\n');
 }
+
+/** Parts of a Markdown text; what is empty is left out. */
+export const paragraphs = (...parts) => parts.filter(Boolean).join('\n\n');
+
+/** What is known of each input, by name, and which files were not measured. */
+export function sources(title, about, skipped) {
+  const credits = [...about].filter(([, text]) => text).map(([name, text]) => `- ${name}: ${text}`);
+  const others = skipped.map(({ name, reason }) => `- ${name}: ${reason}`);
+  return paragraphs(
+    credits.length > 0 && title,
+    credits.join('\n'),
+    others.length > 0 && 'Files of the folder that were not measured:',
+    others.join('\n'),
+  );
+}

@@ -4,14 +4,13 @@ import * as article from './article.mjs';
 import { chart } from './chart.mjs';
 import { BAR, bar, claims, compared, ratios } from './claims.mjs';
 import { CLASSED, OURS, VARIANTS, median } from './experiments.mjs';
-import { count, degrees, error, milliseconds, millions, percent, range, ratio, table } from './format.mjs';
+import { count, degrees, error, millions, milliseconds, paragraphs, percent, range, ratio, table } from './format.mjs';
 import { WRONG } from './deviation.mjs';
 
 const BASELINES = { knn: 'ENN', egg: 'EGG' };
 /** What the paper calls 1.0 L, by the cubes that it counts. */
 const PRINTED_SCALE = article.scaleOf(article.FREE_FORM);
 const label = (variant) => BASELINES[variant] ?? variant;
-const paragraphs = (...parts) => parts.filter(Boolean).join('\n\n');
 const image = ({ file, title }) => `![${title}](paper/${file})`;
 
 /** The charts, `{ name: SVG }`. */

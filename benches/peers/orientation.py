@@ -1,23 +1,21 @@
-"""Signs by Open3D and MeshLib on the clouds of the orientation bench, for its --peers.
+"""Signs by Open3D and MeshLib on one cloud of the orientation bench, for its --peers.
 
-    npm run orientation -- --meshes FOLDER --write CLOUDS
-    pip install open3d==0.20.0 meshlib==3.1.4.297
-    python benches/peers/orientation.py CLOUDS > peers.tsv
-    npm run orientation -- --meshes FOLDER --peers peers.tsv
+    python benches/peers/orientation.py CLOUD
 
-One line for each cloud and method: the share of right signs up to one flip of all, and the seconds on one thread, with
-the normals. Open3D estimates from 30 neighbours and orients along the tangent planes of 15 or 30 (Hoppe 1992); MeshLib
-does both within the radius that holds 48 or 150 points. What takes longer than LIMIT has the share "timeout". Names of
-clouds or methods after the folder choose some of them.
+CLOUD is a PLY file with true normals. One line for each method, in JSON: the share of right signs up to one flip of all, and
+the seconds on one thread, with the normals. Open3D estimates from 30 neighbours and orients along the tangent planes of 15
+or 30 (Hoppe 1992); MeshLib does both within the radius that holds 48 or 150 points. What takes longer than LIMIT, or fails,
+has no share.
 """
 
+import json
 import multiprocessing
 import os
 import sys
 import time
 
 os.environ["OMP_NUM_THREADS"] = "1"
-LIMIT = 90
+LIMIT = 60
 
 
 def open3d_normals(positions, neighbours):
@@ -43,15 +41,15 @@ def meshlib_normals(positions, points):
 
 
 METHODS = {
-    "open3d_15": (open3d_normals, 15),
-    "open3d_30": (open3d_normals, 30),
-    "meshlib_48": (meshlib_normals, 48),
-    "meshlib_150": (meshlib_normals, 150),
+    "Open3D, 15": (open3d_normals, 15),
+    "Open3D, 30": (open3d_normals, 30),
+    "MeshLib, 48": (meshlib_normals, 48),
+    "MeshLib, 150": (meshlib_normals, 150),
 }
 
 
 def read(path):
-    """Positions and true normals of a PLY file as --write leaves it: little endian, x y z nx ny nz as floats."""
+    """Positions and true normals: little endian, x y z nx ny nz as floats."""
     import numpy
 
     with open(path, "rb") as file:
@@ -82,31 +80,23 @@ def run(path, method):
     theirs.close()
     try:
         if not ours.poll(LIMIT):
-            return "timeout", f"{LIMIT}"
+            return {"failure": f"more than {LIMIT} s"}
         share, seconds = ours.recv()
-        return f"{share:.5f}", f"{seconds:.2f}"
+        return {"share": float(share), "seconds": seconds}
     except EOFError:
-        return "failed", "0"
+        return {"failure": "failed"}
     finally:
         process.terminate()
         process.join()
 
 
 def main():
-    if len(sys.argv) < 2:
-        raise SystemExit("usage: orientation.py CLOUDS [ROW or METHOD]...")
-    folder, names = sys.argv[1], set(sys.argv[2:])
-    rows = sorted(name[:-4] for name in os.listdir(folder) if name.endswith(".ply"))
-    unknown = names - set(rows) - set(METHODS)
-    if unknown:
-        raise SystemExit(f"neither a cloud nor a method: {', '.join(sorted(unknown))}")
-    methods = [method for method in METHODS if method in names] or list(METHODS)
+    if len(sys.argv) != 2:
+        raise SystemExit("usage: orientation.py CLOUD")
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    print("row\tmethod\tshare\tseconds", flush=True)
-    for row in [row for row in rows if row in names] or rows:
-        for method in methods:
-            print(row, method, *run(os.path.join(folder, f"{row}.ply"), method), sep="\t", flush=True)
+    for method in METHODS:
+        print(json.dumps({"method": method, **run(sys.argv[1], method)}), flush=True)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,8 @@ import { angles } from '../../benches/accuracy/judge.mjs';
 import { readMeshes } from '../../benches/accuracy/meshes.mjs';
 import { MOST_SECONDS, rightSigns, verdicts } from '../../benches/orientation/judge.mjs';
 import { FULL, MODES, SMALL, measureAll, plannedRows, withOutside } from '../../benches/orientation/measure.mjs';
-import { details, readPeers, report, rowName } from '../../benches/orientation/report.mjs';
+import { linesOf } from '../../benches/orientation/peers.mjs';
+import { details, report } from '../../benches/orientation/report.mjs';
 import { SHAPES } from '../../benches/orientation/shapes.mjs';
 import { signedVolume, thickness, windingNumber } from '../../benches/orientation/solid.mjs';
 import { createEstimator } from '../../dist/node.js';
@@ -102,17 +103,22 @@ describe('the small run', () => {
 
   test('the report has every row, and numbers only', () => {
     const facts = { machine: {}, minutes: 1, hasFolder: false, skipped: [], notes: new Map() };
-    const peers = readPeers(
-      'row\tmethod\tshare\tseconds\nsphere-clean\ttheirs\t0.99999\t1.5\nsphere-clean\tlate\ttimeout\t90\n',
+    const peers = linesOf(
+      '{"method":"theirs","share":0.99999,"seconds":1.5}\n{"method":"late","failure":"more than 90 s"}\n',
     );
     const other = {
       ...facts,
       hasFolder: true,
       skipped: [{ name: 'scan.ply', reason: 'no faces' }],
       notes: new Map([['box', 'wound inwards, so turned']]),
-      peers,
     };
-    const [without, withMeshes] = [report(rows.slice(0, 3), facts), report(rows, other)];
+    const [without, withMeshes] = [
+      report(rows.slice(0, 3), facts),
+      report(
+        rows.map((row) => (row.name === 'sphere' ? { ...row, peers } : row)),
+        other,
+      ),
+    ];
     for (const text of [without, withMeshes])
       assert.doesNotMatch(text.replace(/^undefined, .*$/m, ''), /undefined|NaN|Infinity/);
     assert.match(without, /^\| sphere, clean \| 100 % \| 100 % \| 100 % \| 100 % \| 100 %: met \| 1 \|/m);
@@ -126,7 +132,11 @@ describe('the small run', () => {
       withMeshes,
       /^\| turned, as it is \| 0\.000 % .* 99\.9 %: \*\*missed\*\* by consistent and outward \|/m,
     );
-    assert.match(withMeshes, /^\| sphere, clean \| 100 %, .* s \| 100 %, .* s \| 99\.999 %, 1\.5 s \| no answer \|$/m);
+    assert.match(
+      withMeshes,
+      /^\| sphere, clean \| 100 %, .* s \| 100 %, .* s \| 99\.999 %, 1\.50 s \| more than 90 s \| met \|$/m,
+    );
+    assert.match(withMeshes, /: 1 of 1 rows\. .*; late: no answer/);
     assert.match(withMeshes, /- box: wound inwards, so turned/);
     assert.match(withMeshes, /- scan\.ply: no faces/);
   });
@@ -193,12 +203,6 @@ describe('the shapes', () => {
     }
     assert.equal(outward, 4_000);
   });
-
-  test('rows have names of their own, also as files', () => {
-    const names = plannedRows(FULL, [], [{ name: 'a scan' }]).map(rowName);
-    assert.equal(new Set(names).size, names.length);
-    assert.ok(names.every((name) => /^[\w.-]+$/.test(name)));
-  });
 });
 
 describe('meshes', () => {
@@ -252,8 +256,4 @@ describe('meshes', () => {
     const [away] = thickness(corners, apart, 1e-4);
     assert.equal(away, Infinity);
   });
-});
-
-test('a table of others is refused if it is something else', () => {
-  assert.throws(() => readPeers('name,share\n'), /begins with "name,share"; wanted row, method, share, seconds/);
 });

@@ -1,0 +1,23 @@
+// A Python of the project's own, for the libraries that the benches compare with: nothing else needs it.
+
+import { existsSync } from 'node:fs';
+import { join } from 'node:path';
+import { Failure, output, root, run, tell, tools } from './run.mjs';
+
+const folder = join(tools, 'python');
+const inFolder = (name) =>
+  process.platform === 'win32' ? join(folder, 'Scripts', `${name}.exe`) : join(folder, 'bin', name);
+
+/** The path of a Python with the packages of benches/peers/requirements.txt. */
+export function setupPython() {
+  const python = inFolder('python');
+  if (!existsSync(python)) {
+    const system = ['python3', 'python'].find((name) => output(name, ['--version'])?.startsWith('Python 3'));
+    if (!system) throw new Failure('no Python 3 on the PATH; the peers that are compared with need one, with venv');
+    tell('set-up: a Python environment in .tools, for the peers');
+    run(system, ['-m', 'venv', folder]);
+  }
+  const wanted = join(root, 'benches', 'peers', 'requirements.txt');
+  run(python, ['-m', 'pip', 'install', '--quiet', '--disable-pip-version-check', '--requirement', wanted]);
+  return python;
+}
