@@ -2,7 +2,6 @@
 // points in one run, as docs/peers.md. They are installed into .tools, the first three by a Python there. With --small it takes
 // a minute, and says little.
 
-import { execFileSync } from 'node:child_process';
 import { existsSync, mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { availableParallelism, tmpdir } from 'node:os';
 import { join } from 'node:path';
@@ -13,7 +12,9 @@ import { setupPython } from '../scripts/python.mjs';
 import { setup } from '../scripts/setup.mjs';
 import { sorted, sphere } from './clouds.mjs';
 import { machine } from './machine.mjs';
-import { paragraphs, table } from './paper/format.mjs';
+import { median } from './median.mjs';
+import { paragraphs, table, verdict } from './paper/format.mjs';
+import { linesOf } from './peers/run.mjs';
 
 const PCL = 'pcl.js@1.16.0';
 /** What is measured of ours, and the name of the peer and how often our time it is asked to take, by order of the points. */
@@ -31,7 +32,6 @@ const OURS = {
 };
 const RUNS = 5;
 
-const median = (values) => values.toSorted((a, b) => a - b)[values.length >> 1];
 const times = (ratio) => ratio.toFixed(ratio < 9.95 ? 1 : 0);
 
 /** pcl.js on a CommonJS path of its own; it is no dependency of ours. */
@@ -60,22 +60,13 @@ async function measureOurs(createEstimator, positions, threads) {
   return seconds;
 }
 
-/** The seconds of each run of theirs: by name. */
+/** The seconds of each run of theirs: by name; none of those that fail. */
 function measureTheirs(python, pcl, file, threads) {
-  const lines = (command, args) =>
-    execFileSync(command, args, { encoding: 'utf8', stdio: ['ignore', 'pipe', 'ignore'] })
-      .trimEnd()
-      .split('\n');
-  const script = (name) => join(root, 'benches', 'peers', name);
-  return Object.fromEntries(
-    [
-      ...lines(python, [script('normals.py'), file, `${threads}`]),
-      ...(threads === 1 ? lines(process.execPath, [script('pcl.cjs'), pcl, file]) : []),
-    ].map((line) => {
-      const { method, seconds } = JSON.parse(line);
-      return [method, seconds];
-    }),
-  );
+  const found = [
+    ...linesOf(python, 'normals.py', [file, `${threads}`]),
+    ...(threads === 1 ? linesOf(process.execPath, 'pcl.cjs', [pcl, file]) : []),
+  ];
+  return Object.fromEntries(found.map(({ method, seconds = [] }) => [method, seconds]));
 }
 
 /** Every ratio that is asked for: `{ cloud, threads, ours, peer, ratio, asked }`. */
@@ -111,7 +102,7 @@ function report(rows) {
         peer,
         times(ratio),
         asked,
-        ratio >= asked ? 'met' : '**missed**',
+        verdict(ratio >= asked),
       ]),
     ),
     '## Seconds',

@@ -15,6 +15,7 @@ import { serve } from '../scripts/serve.mjs';
 import { findBrowser, setup } from '../scripts/setup.mjs';
 import { sorted, sphere } from './clouds.mjs';
 import { measure } from './measure.mjs';
+import { median } from './median.mjs';
 
 const SIZES = [187_500, 750_000, 3_000_000];
 const CELLS = ['1.5', 'auto'];
@@ -90,10 +91,8 @@ async function openPage() {
   return { page, close: () => Promise.all([browser.close(), server.close()]) };
 }
 
-const middle = (values) => [...values].sort((a, b) => a - b)[values.length >> 1];
-
 function row(cloud, cell, engine, reports) {
-  const time = (phase) => middle(reports.map((report) => report.milliseconds[phase]));
+  const time = (phase) => median(reports.map((report) => report.milliseconds[phase]));
   const totals = reports.map((report) => report.milliseconds.total);
   const spread = ((Math.max(...totals) - Math.min(...totals)) / time('total')) * 50;
   const { points, peakBytes } = reports[0];

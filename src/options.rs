@@ -62,10 +62,12 @@ pub enum Orient {
     /// Deterministic, and nothing more: `x + 2y + 4z >= 0` for every normal.
     #[default]
     None,
-    /// One sign for each connected surface: outwards where one side of it lies in the open, otherwise away from the middle of
-    /// the surface. For anything; [`crate::Report::components`] tells how sure it is.
+    /// One sign for each connected surface: outwards where one side of it sees more of the open, otherwise away from the middle
+    /// of the surface, and if that is flat `x + 2y + 4z >= 0` for its mean normal. For anything;
+    /// [`crate::Report::components`] tells how sure it is.
     Consistent,
-    /// The same, with more weight on what lies in the open: for closed objects, above all thin and noisy ones.
+    /// The same for surfaces that are closed. Of others every part is turned to what it sees of the open, even if that makes an
+    /// edge of its own: for heaps of parts, and objects with holes.
     Outward,
     /// Towards a position, in the coordinates of the input: for what was scanned from there.
     Viewpoint([f64; 3]),

@@ -84,6 +84,12 @@ pub(crate) fn reserve<T>(items: &mut Vec<T>, count: usize, what: &str) -> Result
     items.try_reserve_exact(count).map_err(|_| Error::memory(what, needed))
 }
 
+/// Takes memory for `count` more items, and for as many again as there are: for a list that grows bit by bit.
+pub(crate) fn grow<T>(items: &mut Vec<T>, count: usize, what: &str) -> Result<(), Error> {
+    let needed = (items.len() + count) as u64 * size_of::<T>() as u64;
+    items.try_reserve(count).map_err(|_| Error::memory(what, needed))
+}
+
 /// A list of `count` times the same, or how much memory was needed.
 pub(crate) fn filled<T: Clone>(value: T, count: usize, what: &str) -> Result<Vec<T>, Error> {
     let mut items = Vec::new();

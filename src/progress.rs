@@ -80,18 +80,18 @@ impl Stage<'_> {
         self.tell(1.0)
     }
 
-    /// The same, with what `work` finds for each number, in their order.
+    /// The same, with what `work` finds for each number, in their order, or its first error.
     pub fn collect<T: Send>(
         &self,
         count: usize,
         what: &'static str,
-        work: &(dyn Fn(usize) -> T + Sync),
+        work: &(dyn Fn(usize) -> Result<T, Error> + Sync),
     ) -> Result<Vec<T>, Error> {
         let found = Gathering::new(what);
         self.run(count, &|i| found.append(vec![(i, work(i))]))?;
         let mut found = found.all()?;
         found.sort_unstable_by_key(|&(i, _)| i);
-        Ok(found.into_iter().map(|(_, found)| found).collect())
+        found.into_iter().map(|(_, found)| found).collect()
     }
 
     /// Tells the observer that `fraction` of this part is done, and lets it stop the call.

@@ -111,6 +111,52 @@ fn every_cloud_ends_in_unit_or_zero_vectors() {
     }
 }
 
+/// Signs change signs only, whatever the cloud; progress rises from 0 to 1, and every point is in one component or in none.
+#[test]
+fn every_cloud_can_be_oriented() {
+    use std::cell::Cell as Heard;
+    use std::ops::ControlFlow;
+    for (name, points) in odd_clouds() {
+        let plain = estimate_f32(&points, &Options::default());
+        for orient in
+            [Orient::Consistent, Orient::Outward, Orient::Viewpoint([1e9, -3.0, 0.5]), Orient::Up([0.0, 0.0, -1.0])]
+        {
+            let components = matches!(orient, Orient::Consistent | Orient::Outward);
+            let options = Options { orient, components, ..Options::default() };
+            let last = Heard::new(0.0);
+            let observer = |_: &'static str, fraction: f64| {
+                assert!(
+                    fraction >= last.get() && fraction <= 1.0,
+                    "{name}, {orient:?}: {fraction} after {}",
+                    last.get()
+                );
+                last.set(fraction);
+                ControlFlow::Continue(())
+            };
+            let points = Points::from_f32(&points).unwrap();
+            let result = estimate(&points, &options, &Progress::new(&observer, &|| 0.0)).unwrap();
+            assert_eq!(last.get(), 1.0, "{name}, {orient:?}");
+            assert_eq!(result.normals.len(), plain.normals.len());
+            for (a, b) in result.normals.chunks_exact(3).zip(plain.normals.chunks_exact(3)) {
+                assert!(a == b || (0..3).all(|i| a[i] == -b[i]), "{name}, {orient:?}: {a:?} of {b:?}");
+            }
+            let Some(of_point) = result.components else { continue };
+            let told = result.report.components.unwrap();
+            let mut sizes = vec![0; told.count as usize];
+            for (&component, normal) in of_point.iter().zip(result.normals.chunks_exact(3)) {
+                assert_eq!(component == u32::MAX, normal == [0.0; 3], "{name}, {orient:?}");
+                if component < u32::MAX {
+                    sizes[component as usize] += 1;
+                }
+            }
+            let largest: Vec<u64> = told.largest.iter().map(|component| component.points).collect();
+            assert_eq!(largest, sizes[..largest.len()], "{name}, {orient:?}");
+            assert!(sizes.is_sorted_by(|a, b| a >= b) && largest.len() == sizes.len().min(1000), "{name}, {orient:?}");
+            assert!(told.largest.iter().all(|component| (0.0..=1.0).contains(&component.confidence)), "{name}");
+        }
+    }
+}
+
 #[test]
 fn points_without_a_plane_are_unresolved() {
     for (name, points) in odd_clouds() {

@@ -120,6 +120,18 @@ fn bodies_that_touch_or_cross_all_face_outwards() {
     }
 }
 
+/// In a box so large that a voxel of the air holds all of a body, one of them with a shell inside.
+#[test]
+fn far_bodies_face_outwards() {
+    let far = moved(sphere(30_000, 30), [3000.0, 0.0, 2000.0], 1.0);
+    let cloud = joined([sphere(30_000, 31), moved(sphere(30_000, 32), [0.0; 3], 0.6), far]);
+    for how in [Orient::Consistent, Orient::Outward] {
+        let result = orient(&cloud.points, how);
+        assert_eq!(share_right(&result.normals, &cloud.normals), 1.0, "{how:?}: {:?}", components(&result));
+        assert_eq!(components(&result).len(), 3);
+    }
+}
+
 #[test]
 fn noise_flips_next_to_nothing() {
     for (name, cloud, least) in [
@@ -187,8 +199,7 @@ fn an_open_box_has_one_sign() {
     assert!(right.max(1.0 - right) > 0.9999, "{right}");
 }
 
-/// The corner of a room, its floor and walls seen from outside too; and no foot under a box: what lies in the open says the
-/// opposite of the edges.
+/// The corner of a room, its floor and walls seen from outside too: what lies in the open says the opposite of the edges.
 #[test]
 fn edges_outweigh_what_is_seen_from_the_wrong_side() {
     let mut random = Random(24);
@@ -259,8 +270,8 @@ fn towards_a_viewpoint_at_any_distance() {
 
 #[test]
 fn every_point_knows_its_component() {
-    let nested = joined([sphere(20_000, 7), moved(sphere(40_000, 8), [5.0, 0.0, 0.0], 1.0)]);
-    let points = [&nested.points[..], &[f32::NAN; 3]].concat();
+    let both = joined([sphere(20_000, 7), moved(sphere(40_000, 8), [5.0, 0.0, 0.0], 1.0)]);
+    let points = [&both.points[..], &[f32::NAN; 3]].concat();
     let points = Points::from_f32(&points).unwrap();
     let options = Options { orient: Orient::Consistent, components: true, ..Options::default() };
     let result = run_with(&points, &options);

@@ -1,12 +1,9 @@
 // What other libraries reach on a cloud of the bench: benches/peers/orientation.py on a file of it.
 
-import { execFileSync } from 'node:child_process';
 import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { root } from '../../scripts/run.mjs';
-
-const SCRIPT = join(root, 'benches', 'peers', 'orientation.py');
+import { linesOf } from '../peers/run.mjs';
 
 /** The rows that others are asked for: with noise and density of every kind they would take hours. */
 const VARIANTS = ['clean', 'noise0.12', 'noise0.6', 'as it is'];
@@ -22,15 +19,8 @@ export async function peersOf(python, row, { positions, normals }, { writePly })
   try {
     const path = join(folder, 'cloud.ply');
     writeFileSync(path, new Uint8Array(await file.arrayBuffer()));
-    return linesOf(execFileSync(python, [SCRIPT, path], { encoding: 'utf8', stdio: ['ignore', 'pipe', 'ignore'] }));
+    return linesOf(python, 'orientation.py', [path]);
   } finally {
     rmSync(folder, { recursive: true });
   }
 }
-
-/** What the script prints. */
-export const linesOf = (text) =>
-  text
-    .trimEnd()
-    .split('\n')
-    .map((line) => JSON.parse(line));

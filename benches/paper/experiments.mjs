@@ -1,6 +1,7 @@
 // The measurements: clouds in, rows of plain numbers out. What the paper says, and how a row is shown, is not known here.
 
 import { freeForm, sphere } from '../clouds.mjs';
+import { median } from '../median.mjs';
 import { classes } from './classes.mjs';
 import { deviations, summary } from './deviation.mjs';
 
@@ -155,11 +156,6 @@ function times(byRound) {
     /** Half the range of the runs, against their median. */
     spread: (Math.max(...sums) - Math.min(...sums)) / 2 / median(sums),
   };
-}
-
-export function median(values) {
-  const ascending = [...values].sort((a, b) => a - b);
-  return (ascending[(values.length - 1) >> 1] + ascending[values.length >> 1]) / 2;
 }
 
 /** The exponent of the power law that fits some (x, y) best on logarithmic axes: 1 is linear. */

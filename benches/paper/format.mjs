@@ -44,3 +44,5 @@ export function sources(title, about, skipped) {
     others.join('\n'),
   );
 }
+
+export const verdict = (isMet) => (isMet ? 'met' : '**missed**');

@@ -3,7 +3,8 @@
 import * as article from './article.mjs';
 import { chart } from './chart.mjs';
 import { BAR, bar, claims, compared, ratios } from './claims.mjs';
-import { CLASSED, OURS, VARIANTS, median } from './experiments.mjs';
+import { median } from '../median.mjs';
+import { CLASSED, OURS, VARIANTS } from './experiments.mjs';
 import { count, degrees, error, millions, milliseconds, paragraphs, percent, range, ratio, table } from './format.mjs';
 import { WRONG } from './deviation.mjs';
 

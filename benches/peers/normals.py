@@ -87,7 +87,11 @@ def main():
         process = multiprocessing.Process(target=measure, args=(path, threads, method, theirs))
         process.start()
         theirs.close()
-        print(json.dumps({"method": method, "seconds": ours.recv()}), flush=True)
+        try:
+            result = {"seconds": ours.recv()}
+        except EOFError:
+            result = {"failure": "failed"}
+        print(json.dumps({"method": method, **result}), flush=True)
         process.join()
 
 

@@ -15,7 +15,7 @@ import sys
 import time
 
 os.environ["OMP_NUM_THREADS"] = "1"
-LIMIT = 60
+LIMIT = 30
 
 
 def open3d_normals(positions, neighbours):

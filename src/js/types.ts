@@ -102,8 +102,8 @@ export interface Report {
   nodesUsed: [number, number, number, number, number];
   /**
    * The surfaces that were given one sign each: how many there are, and at most the thousand largest, the largest first.
-   * `side` tells by what: `'air'`, because the open air lies on one side only; `'volume'`, away from the middle of what is open
-   * to both, or to neither; `'convention'`, because it is open and flat, so that nothing tells: the mean normal has
+   * `side` tells by what: `'air'`, because one side sees more of the open air; `'volume'`, away from the middle of what sees as
+   * much with both, or nothing; `'convention'`, because it is open and flat, so that nothing tells: the mean normal has
    * `x + 2y + 4z >= 0`. `confidence`, from 0, a guess, to 1, which is sure: by the air, of all that is seen of the open, how much
    * more is seen from that side; by volume how much there is, of that of a sphere. Only with `orient: 'consistent'` and
    * `'outward'`.

@@ -35,7 +35,7 @@ pub struct Component {
 /// What told the outside of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// The open air: it lies on one side of the surface only.
+    /// The open air: one side sees more of it.
     Air,
     /// The volume: both sides are open, or neither, and most of the normals point away from the middle of the surface.
     Volume,

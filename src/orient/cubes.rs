@@ -1,9 +1,10 @@
 //! The cubes whose points are parted into patches: so large that a noisy surface is no thicker than one.
 
+use super::patches::aligned;
 use crate::cell::Density;
 use crate::error::Error;
 use crate::grid::{Grid, Placed};
-use crate::lattice::{CUBES, Lattice};
+use crate::lattice::{BRICK, CUBES, Lattice};
 use crate::median::median;
 use crate::points::{Bounds, Points, spread};
 use crate::progress::Stage;
@@ -14,10 +15,10 @@ const POINTS_PER_CELL: f64 = 16.0;
 
 /// With more noise, in edges, the cubes are too small: points anywhere in a cube have 0.31.
 const LARGEST_NOISE: f32 = 0.28;
-const ENLARGEMENT: f64 = 1.25;
+const ENLARGEMENT: f32 = 1.25;
 const ENLARGEMENTS: u32 = 3;
 
-/// The cubes, and the noise in their edges. Sorts the points once, noisy ones up to four times.
+/// The cubes, and the noise in their edges. Sorts the points once, noisy ones twice.
 pub(super) fn sort(
     points: &Points,
     normals: &[Vec3],
@@ -25,31 +26,49 @@ pub(super) fn sort(
     density: &Density,
     stage: &Stage,
 ) -> Result<(Grid, f32), Error> {
-    let mut edge = density.edge(POINTS_PER_CELL);
-    let mut enlargements = 0;
-    loop {
-        let start = f64::from(enlargements) / f64::from(ENLARGEMENTS + 1);
-        let own = stage.part(start..start + 1.0 / f64::from(ENLARGEMENTS + 1));
+    let sort = |edge: f64, stage: &Stage| {
         let lattice = Lattice::new(bounds, &|| density.middle, edge, CUBES);
-        let (grid, _) = Grid::sort(points, &lattice, &own, |_, _| ())?;
-        let noise = noise(&grid, normals);
-        if noise <= LARGEST_NOISE || enlargements == ENLARGEMENTS {
-            return Ok((grid, noise));
+        Ok(Grid::sort(points, &lattice, stage, |_, _| ())?.0)
+    };
+    let edge = density.edge(POINTS_PER_CELL);
+    let grid = sort(edge, &stage.part(0.0..0.5))?;
+    let mut scale = 1.0;
+    let mut found = noise(&grid, normals, scale);
+    for _ in 0..ENLARGEMENTS {
+        if found <= LARGEST_NOISE {
+            break;
         }
-        edge *= ENLARGEMENT;
-        enlargements += 1;
+        scale *= ENLARGEMENT;
+        found = noise(&grid, normals, scale);
     }
+    if scale == 1.0 {
+        return Ok((grid, found));
+    }
+    drop(grid);
+    let grid = sort(f64::from(scale) * edge, &stage.part(0.5..1.0))?;
+    let found = noise(&grid, normals, 1.0);
+    Ok((grid, found))
 }
 
-/// How far points lie off their surface, in edges: the deviation that half of some cubes do not exceed.
-fn noise(grid: &Grid, normals: &[Vec3]) -> f32 {
+/// How far points lie off their surface, in edges: the deviation that half of some cubes do not exceed. The cubes are those of
+/// some bricks, or `scale` times as large, as many as fit into a brick.
+fn noise(grid: &Grid, normals: &[Vec3], scale: f32) -> f32 {
     /// Bricks to look at: their cubes are enough for a median.
     const BRICKS: usize = 256;
-    let mut gaps = Vec::new();
-    let bricks = spread(grid.bricks.len(), BRICKS);
-    let cubes = bricks.flat_map(|brick| grid.cubes_of(brick));
-    let deviations: Vec<f32> = cubes.filter_map(|(points, _)| deviation(points, normals, &mut gaps)).collect();
-    median(&deviations)
+    let along = (BRICK as f32 / scale) as usize;
+    let (mut cubes, mut gaps, mut deviations) = (vec![Vec::new(); along.pow(3)], Vec::new(), Vec::new());
+    for brick in spread(grid.bricks.len(), BRICKS) {
+        cubes.iter_mut().for_each(Vec::clear);
+        for point in &grid.placed[grid.first_point[brick] as usize..grid.first_point[brick + 1] as usize] {
+            let [x, y, z] = (point.local / scale).to_array().map(|c| c as usize);
+            if x.max(y).max(z) < along {
+                cubes[x + along * (y + along * z)].push(*point);
+            }
+        }
+        deviations.extend(cubes.iter().filter_map(|points| deviation(points, normals, &mut gaps)));
+    }
+    // In edges of the cubes looked at.
+    median(&deviations) / scale
 }
 
 /// That of the points of one cube, if they are enough to tell.
@@ -66,7 +85,7 @@ fn deviation(points: &[Placed], normals: &[Vec3], gaps: &mut Vec<f32>) -> Option
     let mut normal = Vec3::ZERO;
     for point in points {
         let own = normals[point.point as usize];
-        normal += if normal.dot(own) < 0.0 { -own } else { own };
+        normal += aligned(own, normal);
     }
     let normal = normal.try_normalize()?;
     gaps.clear();

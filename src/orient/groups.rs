@@ -8,7 +8,7 @@ use crate::power::exp2;
 use crate::progress::Stage;
 use std::ops::Neg;
 
-/// Groups of patches that agree, groups of such groups, and so on, up to the components, which nothing links any more.
+/// Groups of patches that agree, groups of such groups, and so on, up to the components, which at most touch each other.
 pub(super) struct Groups {
     levels: Vec<Level>,
     /// For each component, what speaks for its sign by itself.
@@ -43,7 +43,7 @@ impl Groups {
         own.copy_from_slice(exposure);
         component.iter_mut().zip(0..).for_each(|(component, one)| *component = one);
         for _ in 0..ROUNDS {
-            let done = |groups: usize| 1.0 - groups as f64 / patches as f64;
+            let done = |groups: usize| 1.0 - groups as f64 / patches.max(1) as f64;
             stage.tell(done(own.len()))?;
             let Some(Merging { group, flipped, groups }) = merge(&links, &sizes)? else { break };
             stage.tell(done((own.len() + groups) / 2))?;

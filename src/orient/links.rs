@@ -5,7 +5,7 @@ use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::parallel::Filling;
-use crate::points::reserve;
+use crate::points::{grow, reserve};
 use crate::progress::Stage;
 use crate::surroundings::{NEAR, Places, Surroundings};
 use glam::{Vec3, Vec4Swizzles};
@@ -61,11 +61,14 @@ impl Links {
                     surroundings.look(grid, brick);
                 }
                 near.clear();
+                let mut most = 0;
                 for place in set_bits(surroundings.occupied.near(bit)) {
-                    let cube = surroundings.cube(Places::of_near(bit, place));
-                    near.push((patches.of_cube(cube), NEAR[place as usize % 64].xyz()));
+                    let others = patches.of_cube(surroundings.cube(Places::of_near(bit, place)));
+                    most += others.len();
+                    near.push((others, NEAR[place as usize % 64].xyz()));
                 }
                 for own in patches.of_cube(cube) {
+                    grow(&mut links, most, GRAPH)?;
                     let (start, patch) = (links.len(), &patches.all[own]);
                     for (others, step) in &near {
                         for to in others.clone() {
@@ -80,7 +83,7 @@ impl Links {
                 }
             }
             links.shrink_to_fit();
-            links
+            Ok(links)
         })?;
         // SAFETY: the blocks hold all cubes, and these all patches.
         Ok(Self { runs: unsafe { runs.complete() }, lists })

@@ -40,7 +40,7 @@ const NONE: u32 = u32::MAX;
 /// the points, if it is known.
 ///
 /// Towards a position or a direction: one pass over the points. Otherwise linear in the points; besides these and the normals
-/// some 32 bytes for each on smooth surfaces, 75 in vegetation, 190 where there is no surface at all.
+/// some 32 bytes for each on smooth surfaces, up to 190 where there is no surface at all.
 pub(crate) fn orient(
     points: &Points,
     normals: &mut [Vec3],

@@ -1,10 +1,11 @@
 //! The points of a cube, parted into those that lie on one piece of surface.
 
+use super::groups::signed;
 use crate::error::Error;
 use crate::grid::{Grid, Placed};
 use crate::lattice::cube_centre;
 use crate::parallel::{Filling, concatenated};
-use crate::points::starts;
+use crate::points::{grow, reserve, starts};
 use crate::progress::Stage;
 use glam::Vec3;
 use std::mem::MaybeUninit;
@@ -92,19 +93,23 @@ impl Patches {
                 number.write(placed.point);
             }
             // All at once, so that the processor waits for many places of memory at a time and not for one after the other.
-            let normals: Vec<Vec3> = grid.placed[points].iter().map(|placed| normals[placed.point as usize]).collect();
-            let mut normals = &normals[..];
+            let mut gathered = Vec::new();
+            reserve(&mut gathered, points.len(), WHAT)?;
+            gathered.extend(grid.placed[points].iter().map(|placed| normals[placed.point as usize]));
+            let mut normals = &gathered[..];
             for brick in bricks {
                 for (cube, (points, bit)) in (grid.first_cube[brick] as usize..).zip(grid.cubes_of(brick)) {
                     let before = patches.len();
                     let own = normals.split_off(..points.len()).unwrap_or_default();
                     let memberships = of_point.split_off_mut(..points.len()).unwrap_or_default();
+                    grow(&mut order, points.len(), WHAT)?;
+                    grow(&mut patches, MOST, WHAT)?;
                     split(points, own, cube_centre(bit), thickness, &mut order, &mut patches, memberships);
                     // SAFETY: a cube belongs to one brick.
                     unsafe { counts.write(cube, (patches.len() - before) as u32) };
                 }
             }
-            patches
+            Ok(patches)
         })?;
         // SAFETY: the blocks hold all bricks, these all cubes, and these all points.
         let (counts, points, of_point) = unsafe { (counts.complete(), numbers.complete(), of_point.complete()) };
@@ -119,7 +124,7 @@ impl Patches {
     }
 }
 
-/// Parts the points of one cube; `normals` are theirs.
+/// Parts the points of one cube; `normals` are theirs. There is room in `order` for all of them, and for the patches.
 fn split(
     points: &[Placed],
     normals: &[Vec3],
@@ -162,7 +167,7 @@ fn split(
         let patch = &mut patches[first + number];
         let is_opposite = patch.normal.dot(normal) < 0.0;
         patch.centre += place;
-        patch.normal += if is_opposite { -normal } else { normal };
+        patch.normal += aligned(normal, patch.normal);
         patch.points += 1;
         of_point[i as usize].write(Membership::new(number, is_opposite));
     }
@@ -177,7 +182,7 @@ fn whole(points: &[Placed], normals: &[Vec3], centre: Vec3, thickness: f32) -> O
     let (mut place, mut normal) = (Vec3::ZERO, Vec3::ZERO);
     for (point, &own) in points.iter().zip(normals) {
         place += point.local;
-        normal += if normal.dot(own) < 0.0 { -own } else { own };
+        normal += aligned(own, normal);
     }
     let (place, normal) = (place / points.len() as f32, normal.try_normalize()?);
     let fits = |(point, own): (&Placed, &Vec3)| {
@@ -186,6 +191,12 @@ fn whole(points: &[Placed], normals: &[Vec3], centre: Vec3, thickness: f32) -> O
     };
     let patch = Patch { centre: place - centre, normal, points: points.len() as u32 };
     points.iter().zip(normals).all(fits).then_some(patch)
+}
+
+/// A normal, or its opposite if that is more like `other`.
+#[inline(always)]
+pub(super) fn aligned(normal: Vec3, other: Vec3) -> Vec3 {
+    signed(other.dot(normal) < 0.0, normal)
 }
 
 /// Orders places in a brick by x, then y, then z. Numbers that are not negative have their bits in their order.

@@ -153,6 +153,13 @@ test('a bad file gives a message that can be read, and the cloud before stays', 
   assert.ok(await page.locator('#error').isHidden());
 });
 
+test('a file of one point ends too, without a normal', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'one.ply', spherePly(1));
+  const { error, unresolved } = await result(page, 'one.ply');
+  assert.deepEqual({ error, unresolved }, { error: undefined, unresolved: 1 });
+});
+
 test('points that are not finite and a stray one neither blank the view nor shrink the rest', async () => {
   page = await browser.openPage(browser.isolated);
   const file = spherePly(20_000);

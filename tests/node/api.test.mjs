@@ -170,6 +170,10 @@ test('progress rises from 0 to exactly 1, for each kind of call', async () => {
   };
   const { normals } = await estimateNormals(positions, { onProgress });
   check('estimateNormals');
+  for (const points of [positions, positions.subarray(0, 3), new Float32Array()]) {
+    await estimateNormals(points, { orient: 'consistent', onProgress });
+    check(`${points.length / 3} points, consistent`);
+  }
   const ply = await writePly({ count: 300000, positions, origin: [0, 0, 0] }, { normals }, { onProgress });
   check('writePly of a cloud');
   await readPointCloud(ply, { onProgress });
@@ -496,6 +500,17 @@ test('a download tells its progress, and can be aborted', async () => {
   });
   await assert.rejects(call, (reason) => reason === 'enough');
   assert.deepEqual(told[0], { phase: 'download', fraction: 0 });
+});
+
+test('a file tells where the scanner stood', async () => {
+  const place = ['view_px', 'view_py', 'view_pz'].map((name) => `property double ${name}\n`).join('');
+  const axes = ['x', 'y', 'z'].map((name) => `property double ${name}\n`).join('');
+  const header = `ply\nformat ascii 1.0\nelement camera 1\n${place}element vertex 2\n${axes}end_header\n`;
+  const { source, origin } = await readPointCloud(
+    new TextEncoder().encode(`${header}4500000.5 -2.25 7\n4500001 0 0\n4500003 1 1\n`),
+  );
+  assert.deepEqual(source.viewpoint, [4500000.5, -2.25, 7]);
+  assert.notEqual(origin[0], 0);
 });
 
 test('maxPoints refuses a larger file', async () => {

@@ -108,13 +108,20 @@ function takeTurns(session: Session, viewer: Viewer): void {
     if (point >= 0) session.flipSurface(point);
   };
   let pressed = { x: NaN, y: NaN };
-  canvas.addEventListener('pointerdown', ({ clientX: x, clientY: y }) => (pressed = { x, y }));
+  let moved = 0;
+  canvas.addEventListener('pointerdown', ({ clientX: x, clientY: y }) => {
+    pressed = { x, y };
+    moved = 0;
+  });
+  canvas.addEventListener('pointermove', ({ clientX: x, clientY: y }) => {
+    moved = Math.max(moved, Math.hypot(x - pressed.x, y - pressed.y));
+  });
   canvas.addEventListener('click', ({ clientX: x, clientY: y, detail }) => {
     // The second click of two centres the view.
-    if (detail < 2 && Math.hypot(x - pressed.x, y - pressed.y) <= STILL) turn({ x, y });
+    if (detail < 2 && moved <= STILL) turn({ x, y });
   });
-  canvas.addEventListener('keydown', ({ key }) => {
-    if (key === 'Enter') turn();
+  canvas.addEventListener('keydown', ({ key, repeat }) => {
+    if (key === 'Enter' && !repeat) turn();
   });
 }
 

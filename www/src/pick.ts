@@ -1,4 +1,4 @@
-// The point under a ray, for a double click: the nearest to the eye of those close to the ray.
+// The point under a ray, for clicks: the nearest to the eye of those close to the ray.
 
 type Vector = readonly [number, number, number];
 

@@ -9,7 +9,8 @@ export function scannerOf({ source, origin }: PointCloud): [number, number, numb
 
 /** The numbers of a comment such as `scanner position: 1.5, 0, 2`; with more or fewer it means something else. */
 function placeIn(comment: string): [number, number, number] | undefined {
-  if (!/(scanner|sensor|camera)\W*(position|origin|location)|view\W?point/i.test(comment)) return undefined;
+  if (!/(scanner|sensor|camera)[\W_]*(position|origin|location)|view[\W_]?point/i.test(comment)) return undefined;
   const [x, y, z, ...more] = (comment.match(/[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?/gi) ?? []).map(Number);
-  return x !== undefined && y !== undefined && z !== undefined && more.length === 0 ? [x, y, z] : undefined;
+  if (x === undefined || y === undefined || z === undefined || more.length > 0) return undefined;
+  return Number.isFinite(x + y + z) ? [x, y, z] : undefined;
 }

@@ -100,6 +100,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
       report: undefined,
       used: undefined,
       ...UNTURNED,
+      turning: false,
       up,
       shading,
       cellKind: 'auto',
