@@ -175,6 +175,20 @@ fn an_open_surface_has_one_sign() {
     }
 }
 
+/// Trees hide the open from above, and nothing does from below.
+#[test]
+fn terrain_under_trees_faces_up() {
+    let ground = terrain(80_000, 33);
+    let trees = (0..81).map(|i| {
+        let place = [0.2 * f64::from(i % 9) - 0.8, 0.2 * f64::from(i / 9) - 0.8, 0.6];
+        moved(sphere(1000, 34 + i as u64), place, 0.08)
+    });
+    let cloud = joined([ground].into_iter().chain(trees));
+    let result = orient(&cloud.points, Orient::Consistent);
+    assert_eq!(share_right(&result.normals, &cloud.normals), 1.0, "{:?}", components(&result)[0]);
+    assert_ne!(components(&result)[0].side, Side::Air);
+}
+
 /// A dome is open too, but has a hollow.
 #[test]
 fn an_open_surface_that_bulges_faces_away_from_its_middle() {

@@ -34,8 +34,9 @@ export interface EstimateOptions {
   k?: number;
   /**
    * How signs are chosen. Default `'none'`: `x + 2y + 4z >= 0`, deterministic and nothing more. `'consistent'`: one sign for
-   * each connected surface, outwards where one side of it lies in the open, otherwise away from the middle of the surface.
-   * `'outward'`: the same with more weight on what lies in the open, for closed objects, above all thin and noisy ones.
+   * each connected surface, outwards if it is closed, otherwise away from its middle, and if it is flat `x + 2y + 4z >= 0` for
+   * its mean normal. `'outward'`: the same for closed surfaces; of others every part is turned to what it sees of the open, for
+   * heaps of parts and objects with holes.
    * `viewpoint`: towards a position, in the coordinates of `positions`. `up`: towards a direction, for terrain.
    */
   orient?:
@@ -102,11 +103,11 @@ export interface Report {
   nodesUsed: [number, number, number, number, number];
   /**
    * The surfaces that were given one sign each: how many there are, and at most the thousand largest, the largest first.
-   * `side` tells by what: `'air'`, because one side sees more of the open air; `'volume'`, away from the middle of what sees as
-   * much with both, or nothing; `'convention'`, because it is open and flat, so that nothing tells: the mean normal has
-   * `x + 2y + 4z >= 0`. `confidence`, from 0, a guess, to 1, which is sure: by the air, of all that is seen of the open, how much
-   * more is seen from that side; by volume how much there is, of that of a sphere. Only with `orient: 'consistent'` and
-   * `'outward'`.
+   * `side` tells by what: `'air'`, because the surface is closed, and one side sees much more of the open air; `'volume'`, away
+   * from the middle of what is open, or hidden; `'convention'`, because it is open and flat, so that nothing tells: the mean
+   * normal has `x + 2y + 4z >= 0`. `confidence`, from 0, a guess, to 1, which is sure: of all that is seen of the open, how much
+   * more is seen from one side; for what sees nothing of it how much volume there is, of that of a sphere. Only with
+   * `orient: 'consistent'` and `'outward'`.
    */
   components?: {
     count: number;

@@ -28,16 +28,16 @@ pub struct Component {
     /// What told its outside.
     pub side: Side,
     /// How much more speaks for that side than for the other: 0 is a guess, 1 is sure. By the air of all that is seen of the
-    /// open how much more is seen from that side; by volume how much there is, of that of a sphere.
+    /// open how much more is seen from one side; for what sees nothing of it how much volume there is, of that of a sphere.
     pub confidence: f64,
 }
 
 /// What told the outside of a component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// The open air: one side sees more of it.
+    /// The open air: the surface is closed, so that one side sees much more of it.
     Air,
-    /// The volume: both sides are open, or neither, and most of the normals point away from the middle of the surface.
+    /// The volume: the surface is open, or hidden, and most of its normals point away from its middle.
     Volume,
     /// Nothing: the surface is open and flat. By convention `x + 2y + 4z >= 0` for its mean normal.
     Convention,
@@ -112,9 +112,7 @@ const WHAT: &str = "the components";
 /// Components that are told about.
 const TOLD: usize = 1000;
 
-/// Where one side sees hardly more of the open than the other, the air says nothing; nor where hardly any patch sees it at
-/// all: that is a gap in what hides it.
-const LEAST_AIR: f64 = 0.05;
+/// Where hardly any patch sees the open the air says nothing: that is a gap in what hides it.
 const LEAST_SIGHT: f64 = 0.01;
 
 /// With less volume a surface is flat, and its bulges are chance. A shallow dome has this if its height is a seventieth of its
@@ -146,15 +144,17 @@ impl Sums {
         let share = |part: f64, all: f64| if all > 0.0 { part / all } else { 0.0 };
         let air = share(self.exposure, self.sight);
         let volume = share(self.flux - self.place.dot(self.normal) / self.points as f64, self.reach);
-        let (side, evidence) = if air.abs() >= LEAST_AIR && self.sight >= LEAST_SIGHT * self.patches as f64 {
-            (Side::Air, air)
+        let is_seen = self.sight >= LEAST_SIGHT * self.patches as f64;
+        let told =
+            |side, confidence: f64| Component { points: self.points, side, confidence: confidence.abs().min(1.0) };
+        if is_seen && air.abs() > CLOSED {
+            (told(Side::Air, air), air < 0.0)
         } else if volume.abs() >= LEAST_VOLUME {
-            (Side::Volume, volume)
+            // What is open to both sides has no outside to be sure of; terrain even sees more of the open from below.
+            (told(Side::Volume, if is_seen { air } else { volume }), volume < 0.0)
         } else {
-            let is_inwards = self.normal.dot(POSITIVE) < 0.0;
-            return (Component { points: self.points, side: Side::Convention, confidence: 0.0 }, is_inwards);
-        };
-        (Component { points: self.points, side, confidence: evidence.abs().min(1.0) }, evidence < 0.0)
+            (told(Side::Convention, 0.0), self.normal.dot(POSITIVE) < 0.0)
+        }
     }
 }
 
