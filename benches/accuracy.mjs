@@ -16,14 +16,6 @@ import { machine } from './machine.mjs';
 
 const OPTIONS = { meshes: { type: 'string' }, out: { type: 'string' }, rows: { type: 'string' } };
 
-function choose(rows, names) {
-  try {
-    return chosenRows(rows, names);
-  } catch ({ message }) {
-    throw new Failure(message);
-  }
-}
-
 await main(async () => {
   const { values } = parseArgs({ options: OPTIONS });
   const folder = fromUser(values.meshes);
@@ -34,7 +26,7 @@ await main(async () => {
   const start = performance.now();
   const { meshes, skipped } = readMeshes(folder);
   const planned = plannedRows(FULL, meshes);
-  const chosen = values.rows === undefined ? planned : choose(planned, values.rows.split(','));
+  const chosen = values.rows === undefined ? planned : chosenRows(planned, values.rows.split(','));
   const threads = availableParallelism();
   const estimator = await createEstimator({ threads });
   try {

@@ -25,14 +25,6 @@ const OPTIONS = {
   peers: { type: 'boolean' },
 };
 
-function orFail(job) {
-  try {
-    return job();
-  } catch ({ message }) {
-    throw new Failure(message);
-  }
-}
-
 await main(async () => {
   const { values } = parseArgs({ options: OPTIONS });
   const folder = fromUser(values.meshes);
@@ -48,7 +40,7 @@ await main(async () => {
     const { meshes, skipped, notes } = withOutside(read.meshes);
     const scans = await readScans(folder, (bytes) => estimator.readPointCloud(bytes));
     const planned = plannedRows(FULL, meshes, scans);
-    const chosen = values.rows === undefined ? planned : orFail(() => chosenRows(planned, values.rows.split(',')));
+    const chosen = values.rows === undefined ? planned : chosenRows(planned, values.rows.split(','));
     const peers = python && ((row, cloud) => peersOf(python, row, cloud, estimator));
     const rows = await measureAll(estimator, chosen, { tell: (what) => tell(`orientation: ${what}`), peers });
     if (values.rows !== undefined) {

@@ -1,5 +1,6 @@
 // The measurements: rows of clouds by methods, as plain numbers.
 
+import { Failure } from '../../scripts/run.mjs';
 import { cloudOf, VARIANTS } from './clouds.mjs';
 import { jetNormal } from './jet.mjs';
 import { angles, summary, unresolved } from './judge.mjs';
@@ -80,7 +81,7 @@ export function chosenRows(rows, names) {
   const unknown = names.find((name) => !rows.some((row) => means(row, name)));
   if (unknown !== undefined) {
     const known = [...new Set(rows.flatMap(({ name, variant }) => [name, variant]))];
-    throw new Error(`no row is called ${unknown}; wanted some of ${known.join(', ')}, or both as cube-clean`);
+    throw new Failure(`no row is called ${unknown}; wanted some of ${known.join(', ')}, or both as cube-clean`);
   }
   return rows.filter((row) => names.some((name) => means(row, name)));
 }
