@@ -1,13 +1,13 @@
 //! Which side of each surface is its outside.
 
 use super::air::Sights;
-use super::groups::{Groups, signed};
+use super::groups::signed;
 use super::patches::Patches;
+use super::signs::{CLOSED, Signs};
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::lattice::{BRICK, cube_centre};
 use crate::points::{filled, reserve};
-use crate::progress::Stage;
 use glam::DVec3;
 use std::cmp::Reverse;
 
@@ -52,58 +52,6 @@ impl Side {
             Self::Convention => "convention",
         }
     }
-}
-
-/// A sign for each patch.
-pub(super) struct Signs {
-    /// For each patch whether its normal must be flipped.
-    pub flipped: Vec<bool>,
-    /// For each patch the number of its component.
-    pub component: Vec<u32>,
-    pub components: usize,
-}
-
-/// How many patches of a group count fully for what lies in the open. Few: an open box, or the corner of a room, is seen from
-/// its wrong side too, and its edges must outweigh that; at most as many as a spike has.
-const SPAN: f32 = 4.0;
-
-/// A surface that sees so much more of the open on one side than on the other is closed. Rooms from inside have 0.3.
-const CLOSED: f64 = 0.5;
-
-impl Signs {
-    /// Counts all that lies in the open.
-    pub fn outward(groups: Groups, stage: &Stage) -> Result<Self, Error> {
-        let flipped = groups.signs(f32::INFINITY, stage)?;
-        Ok(Self { flipped, components: groups.components(), component: groups.component })
-    }
-
-    /// Counts all that lies in the open for components that are closed then, and for others a share.
-    pub fn consistent(groups: Groups, sights: &Sights, stage: &Stage) -> Result<Self, Error> {
-        let mut flipped = groups.signs(f32::INFINITY, &stage.part(0.0..0.5))?;
-        let is_closed = closed(&groups, sights, &flipped)?;
-        if is_closed.contains(&false) {
-            let cautious = groups.signs(SPAN, &stage.part(0.5..1.0))?;
-            for ((flipped, cautious), &component) in flipped.iter_mut().zip(cautious).zip(&groups.component) {
-                if !is_closed[component as usize] {
-                    *flipped = cautious;
-                }
-            }
-        }
-        Ok(Self { flipped, components: groups.components(), component: groups.component })
-    }
-}
-
-/// For each component whether it is closed.
-fn closed(groups: &Groups, sights: &Sights, flipped: &[bool]) -> Result<Vec<bool>, Error> {
-    let mut sums = filled((0.0, 0.0), groups.components(), WHAT)?;
-    for (i, &component) in groups.component.iter().enumerate() {
-        let (exposure, all) = &mut sums[component as usize];
-        *exposure += f64::from(signed(flipped[i], sights.exposure[i]));
-        *all += f64::from(sights.all[i]);
-    }
-    let mut is_closed = filled(false, sums.len(), WHAT)?;
-    is_closed.iter_mut().zip(sums).for_each(|(is_closed, (exposure, all))| *is_closed = exposure.abs() > CLOSED * all);
-    Ok(is_closed)
 }
 
 /// What errors call the memory of all this.

@@ -10,6 +10,7 @@ mod cubes;
 mod groups;
 mod links;
 mod patches;
+mod signs;
 
 pub use components::{Component, Components, Side};
 
@@ -20,11 +21,12 @@ use crate::options::{Options, Orient};
 use crate::parallel::{self, Scatter};
 use crate::points::{Bounds, CHUNK, Points, filled};
 use crate::progress::Stage;
-use components::{Signs, decide};
+use components::decide;
 use glam::{DVec3, Vec3};
 use groups::Groups;
 use links::Links;
 use patches::{Members, Patches};
+use signs::Signs;
 
 /// What was found out about the surfaces of a cloud.
 pub(crate) struct Surfaces {
