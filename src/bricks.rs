@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::lattice::Lattice;
-use crate::parallel::{self, Filling, Gathering, Scatter};
+use crate::parallel::{self, Filling, Gathering};
 use crate::points::{CHUNK, Points, reserve};
 use crate::progress::Stage;
 use glam::IVec3;
@@ -72,11 +72,12 @@ impl Layout {
     }
 }
 
-/// The key of a point that lies in no brick.
+/// The slot of a point that lies in no brick.
 pub(crate) const OUTSIDE: u32 = u32::MAX;
 
 impl Bricks {
-    /// Finds the bricks of all points, and for each point the number of its brick. Two passes, parallel.
+    /// Finds the bricks of all points, and for each point the slot of its brick, [`OUTSIDE`] if it has none. One pass,
+    /// parallel, two where the box is nearly empty.
     pub fn find(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
         let layout = Layout::of(lattice);
         // At most 3 bytes a point. A surface with a few points in a cube needs a tenth of that.
@@ -94,7 +95,7 @@ impl Bricks {
         reserve(&mut bits, count, "the grid")?;
         bits.resize_with(count, AtomicU64::default);
         let slots = Filling::<u32>::new(points.len(), "the sorting keys")?;
-        stage.part(0.0..0.6).run(points.chunks(), &|i| {
+        stage.run(points.chunks(), &|i| {
             for point in parallel::piece(points.len(), CHUNK, i) {
                 let mut key = OUTSIDE;
                 if let Some((brick, _)) = lattice.locate(points.positions[point]) {
@@ -111,7 +112,7 @@ impl Bricks {
             }
         })?;
         // SAFETY: the chunks hold all points.
-        let mut keys = unsafe { slots.complete() };
+        let slots = unsafe { slots.complete() };
 
         let bits: Vec<u64> = bits.into_iter().map(AtomicU64::into_inner).collect();
         let mut before = Vec::new();
@@ -127,16 +128,7 @@ impl Bricks {
             places.extend(set_bits(word).map(|bit| layout.brick(64 * i + bit as usize)));
         }
 
-        let target = Scatter::new(&mut keys);
-        stage.part(0.6..1.0).run(points.chunks(), &|i| {
-            // SAFETY: each key belongs to one chunk.
-            for key in unsafe { target.slice(parallel::piece(points.len(), CHUNK, i)) } {
-                if *key != OUTSIDE {
-                    *key = rank(&bits, &before, *key as usize);
-                }
-            }
-        })?;
-        Ok((Self { places, index: Index::Box { layout, bits, before } }, keys))
+        Ok((Self { places, index: Index::Box { layout, bits, before } }, slots))
     }
 
     fn in_table(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
@@ -182,6 +174,15 @@ impl Bricks {
         // SAFETY: the chunks hold all points.
         let keys = unsafe { keys.complete() };
         Ok((bricks, keys))
+    }
+
+    /// The number of the brick in a slot that [`Bricks::find`] answered with.
+    #[inline(always)]
+    pub fn in_slot(&self, slot: u32) -> u32 {
+        match &self.index {
+            Index::Box { bits, before, .. } => rank(bits, before, slot as usize),
+            Index::Table { .. } => slot,
+        }
     }
 
     /// How many bricks there are.

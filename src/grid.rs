@@ -8,8 +8,8 @@ use crate::points::{CHUNK, Points, reserve};
 use crate::progress::Stage;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec3, Vec4};
-use std::mem::MaybeUninit;
 use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// A point in its brick.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -66,10 +66,9 @@ impl Grid {
     /// All but the ends of the cubes.
     #[optimize(size)]
     fn sort_points(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<Self, Error> {
-        let (bricks, keys) = Bricks::find(points, lattice, &stage.part(0.0..0.4))?;
-        let (first_point, by_brick) = sort_by_brick(points, lattice, &bricks, keys, &stage.part(0.4..0.8))?;
-        let (placed, masks) = sort_by_cube(&by_brick, &first_point, &stage.part(0.8..1.0))?;
-        drop(by_brick);
+        let (bricks, slots) = Bricks::find(points, lattice, &stage.part(0.0..0.4))?;
+        let (first_point, mut placed) = sort_by_brick(points, lattice, &bricks, slots, &stage.part(0.4..0.8))?;
+        let masks = sort_by_cube(&mut placed, &first_point, &stage.part(0.8..1.0))?;
 
         let mut first_cube = Vec::new();
         reserve(&mut first_cube, masks.len() + 1, "the grid")?;
@@ -188,7 +187,7 @@ fn sort_by_brick(
     points: &Points,
     lattice: &Lattice,
     bricks: &Bricks,
-    keys: Vec<u32>,
+    mut slots: Vec<u32>,
     stage: &Stage,
 ) -> Result<(Vec<u32>, Vec<Placed>), Error> {
     let count = points.len();
@@ -201,16 +200,18 @@ fn sort_by_brick(
     let mut counts: Vec<u32> = Vec::new();
     reserve(&mut counts, pieces * bricks.len(), "the grid")?;
     counts.resize(pieces * bricks.len(), 0);
-    let shared = Scatter::new(&mut counts);
+    let (shared, keys) = (Scatter::new(&mut counts), Scatter::new(&mut slots));
     stage.part(0.0..0.15).run(pieces, &|i| {
-        // SAFETY: each piece counts in its own part.
-        let counts = unsafe { shared.slice(of_piece(i)) };
-        for &key in &keys[parallel::piece(count, size, i)] {
-            if key != OUTSIDE {
-                counts[key as usize] += 1;
+        // SAFETY: each piece counts in its own part, and reads its own points.
+        let (counts, keys) = unsafe { (shared.slice(of_piece(i)), keys.slice(parallel::piece(count, size, i))) };
+        for key in keys {
+            if *key != OUTSIDE {
+                *key = bricks.in_slot(*key);
+                counts[*key as usize] += 1;
             }
         }
     })?;
+    let keys = slots;
 
     // Where each piece writes its first point of each brick.
     let mut first_point = Vec::new();
@@ -243,26 +244,40 @@ fn sort_by_brick(
     Ok((first_point, unsafe { placed.complete() }))
 }
 
-/// Sorts the points of each brick by cube and octant, stable; also answers for each brick which cubes are occupied.
-fn sort_by_cube(by_brick: &[Placed], first_point: &[u32], stage: &Stage) -> Result<(Vec<Placed>, Vec<u64>), Error> {
-    let placed = Filling::new(by_brick.len(), "the sorted points")?;
+/// Sorts the points of each brick by cube and octant, stable and in place; answers for each brick which cubes are occupied.
+#[optimize(size)]
+fn sort_by_cube(placed: &mut [Placed], first_point: &[u32], stage: &Stage) -> Result<Vec<u64>, Error> {
     let masks = Filling::new(first_point.len() - 1, "the grid")?;
+    // Bytes that were not to be had.
+    let (placed, lacking) = (Scatter::new(placed), AtomicUsize::new(0));
     let blocks = blocks(first_point);
     stage.run(blocks.len(), &|block| {
-        let mut next = [0; 8 * 64];
+        let (mut next, mut unsorted) = ([0; 8 * 64], Vec::new());
         for brick in blocks[block].clone() {
-            let range = first_point[brick] as usize..first_point[brick + 1] as usize;
             // SAFETY: a brick belongs to one block, and its points and its mask to no other brick.
-            unsafe { masks.write(brick, sort_brick(&by_brick[range.clone()], placed.slice(range), &mut next)) };
+            let points = unsafe { placed.slice(first_point[brick] as usize..first_point[brick + 1] as usize) };
+            // A copy of one brick, so mostly in the nearest cache.
+            unsorted.clear();
+            if unsorted.try_reserve(points.len()).is_err() {
+                lacking.store(size_of_val(points), Relaxed);
+                return;
+            }
+            unsorted.extend_from_slice(points);
+            // SAFETY: as above.
+            unsafe { masks.write(brick, sort_brick(&unsorted, points, &mut next)) };
         }
     })?;
-    // SAFETY: the blocks hold all bricks, and these all points; `sort_brick` writes as many points as it reads.
-    unsafe { Ok((placed.complete(), masks.complete())) }
+    match lacking.into_inner() {
+        0 => {}
+        bytes => return Err(Error::memory("the sorted points", bytes as u64)),
+    }
+    // SAFETY: the blocks hold all bricks, and none failed.
+    Ok(unsafe { masks.complete() })
 }
 
 /// A counting sort over the octants of the 64 cubes of a brick; answers which cubes are occupied. All of `next` is zero
 /// before and after: where few cubes are occupied, to clear the whole would take longer than to sort.
-fn sort_brick(points: &[Placed], sorted: &mut [MaybeUninit<Placed>], next: &mut [u32; 8 * 64]) -> u64 {
+fn sort_brick(points: &[Placed], sorted: &mut [Placed], next: &mut [u32; 8 * 64]) -> u64 {
     let mut mask = 0;
     for point in points {
         let octant = octant_in_brick(point.lanes());
@@ -276,7 +291,7 @@ fn sort_brick(points: &[Placed], sorted: &mut [MaybeUninit<Placed>], next: &mut 
     }
     for point in points {
         let next = &mut next[octant_in_brick(point.lanes()) as usize];
-        sorted[*next as usize].write(*point);
+        sorted[*next as usize] = *point;
         *next += 1;
     }
     for cube in set_bits(mask) {

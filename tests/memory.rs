@@ -44,8 +44,8 @@ fn peak_bytes_a_point() {
     // Input and normals are 12 bytes each.
     let (none, consistent) = (Orient::None, Orient::Consistent);
     for (name, points, cell, orient, bound) in [
-        ("sphere, 1.5 L", &sphere, Cell::Scale(1.5), none, 48),
-        ("sphere, 1.0 L", &sphere, Cell::Scale(1.0), none, 48),
+        ("sphere, 1.5 L", &sphere, Cell::Scale(1.5), none, 44),
+        ("sphere, 1.0 L", &sphere, Cell::Scale(1.0), none, 44),
         ("sphere, auto", &sphere, Cell::Auto, none, 52),
         ("a stray point", &stray(3e6), Cell::Auto, none, 52),
         ("a stray point beyond all cubes", &stray(-1e30), Cell::Auto, none, 52),
