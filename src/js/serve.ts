@@ -46,10 +46,12 @@ async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Plat
     return buffer;
   }
 
-  function take(buffer: Buffer): ArrayBuffer {
-    const bytes = view(buffer).slice().buffer;
+  /** Out of wasm: into new memory, or into bytes of the same length that nobody needs any more. */
+  function take(buffer: Buffer, used?: Uint8Array<ArrayBuffer>): ArrayBuffer {
+    used?.set(view(buffer));
+    const bytes = used ?? view(buffer).slice();
     buffer.free();
-    return bytes;
+    return bytes.buffer;
   }
 
   /** Half of the progress. */
@@ -89,11 +91,13 @@ async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Plat
       return mode;
     case 'estimate': {
       const positions = put(call.positions);
-      // Not kept in JavaScript memory meanwhile: 12 or 24 bytes a point.
-      delete (call as Partial<typeof call>).positions;
+      // The normals need just as much, and memory that is new to the system takes several times as long to write to.
+      const used = call.double ? undefined : call.positions;
+      // Not kept meanwhile: 24 bytes a point.
+      if (call.double) delete (call as Partial<typeof call>).positions;
       const { normals, curvature, components, report } = glue.estimate(positions, call.double, call.options, tell);
       return {
-        normals: new Float32Array(take(normals)),
+        normals: new Float32Array(take(normals, used)),
         ...(curvature && { curvature: new Float32Array(take(curvature)) }),
         ...(components && { components: new Uint32Array(take(components)) }),
         report: { ...report, ...mode },
