@@ -26,6 +26,8 @@ use crate::error::Error;
 use crate::progress::Progress;
 use js_sys::{Function, Object, Reflect};
 use std::ops::ControlFlow;
+#[cfg(feature = "threads")]
+use std::sync::{Condvar, Mutex, PoisonError};
 use wasm_bindgen::prelude::*;
 use web_sys::Performance;
 
@@ -33,14 +35,59 @@ use web_sys::Performance;
 compile_error!("feature `threads` needs atomics, in the standard library too: scripts/build.mjs has the flags");
 
 /// Runs `work` with a progress that goes to `tell(phase, fraction)`, and measures its memory.
-fn call<T>(tell: &Function, work: impl FnOnce(&Progress) -> Result<T, Error>) -> Result<T, JsValue> {
+fn call<T: Send>(tell: &Function, work: impl FnOnce(&Progress) -> Result<T, Error> + Send) -> Result<T, JsValue> {
     memory::begin();
-    let observer = |phase: &'static str, fraction: f64| {
+    let hear = |phase: &'static str, fraction: f64| {
         // What the listener throws is its own affair.
         let _ = tell.call2(&JsValue::UNDEFINED, &phase.into(), &fraction.into());
+    };
+    #[cfg(feature = "threads")]
+    let result = in_pool(work, &hear);
+    #[cfg(not(feature = "threads"))]
+    let result = run(work, &hear);
+    Ok(result?)
+}
+
+/// Runs `work` on a thread of the pool, and tells of its progress on this one, which has the listener. A loop that begins
+/// outside of the pool has to wake a thread, which then wakes the next; within it one is awake.
+#[cfg(feature = "threads")]
+fn in_pool<T: Send>(
+    work: impl FnOnce(&Progress) -> Result<T, Error> + Send,
+    hear: &dyn Fn(&'static str, f64),
+) -> Result<T, Error> {
+    // What was not told yet, and whether that is all. Not a channel of the standard library: receiving hangs in WebAssembly.
+    let (state, changed) = (Mutex::new((Vec::new(), false)), Condvar::new());
+    let lock = || state.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut result = Err(Error::Cancelled);
+    rayon::in_place_scope(|scope| {
+        scope.spawn(|_| {
+            let send = |phase, fraction| {
+                lock().0.push((phase, fraction));
+                changed.notify_one();
+            };
+            result = run(work, &send);
+            lock().1 = true;
+            changed.notify_one();
+        });
+        let mut ended = false;
+        while !ended {
+            let is_silent = |state: &mut (Vec<_>, bool)| state.0.is_empty() && !state.1;
+            let mut state = changed.wait_while(lock(), is_silent).unwrap_or_else(PoisonError::into_inner);
+            ended = state.1;
+            let told = std::mem::take(&mut state.0);
+            drop(state);
+            told.into_iter().for_each(|(phase, fraction)| hear(phase, fraction));
+        }
+    });
+    result
+}
+
+fn run<T>(work: impl FnOnce(&Progress) -> Result<T, Error>, hear: &dyn Fn(&'static str, f64)) -> Result<T, Error> {
+    let observer = |phase: &'static str, fraction: f64| {
+        hear(phase, fraction);
         ControlFlow::Continue(())
     };
-    Ok(work(&Progress::new(&observer, &milliseconds))?)
+    work(&Progress::new(&observer, &milliseconds))
 }
 
 #[wasm_bindgen]

@@ -17,28 +17,28 @@ pub fn estimate(
     #[wasm_bindgen(unchecked_param_type = "object")] options: &JsValue,
     #[wasm_bindgen(unchecked_param_type = "(phase: string, fraction: number) => void")] tell: &Function,
 ) -> Result<Object, JsValue> {
-    call(tell, |progress| {
-        let options = options::parse(options)?;
-        let Estimate { normals, curvature, components, report } = if double {
+    let options = options::parse(options)?;
+    let Estimate { normals, curvature, components, report } = call(tell, move |progress| {
+        if double {
             let points = Points::from_f64(positions.numbers("positions", 3)?)?;
             // The points are a copy: what they were copied from is not needed any more.
             drop(positions);
-            crate::estimate::estimate(&points, &options, progress)?
+            crate::estimate::estimate(&points, &options, progress)
         } else {
-            crate::estimate::estimate(&Points::from_f32(positions.numbers("positions", 3)?)?, &options, progress)?
-        };
-        let estimation = Object::new();
-        set(&estimation, "normals", Buffer::from(normals));
-        if let Some(curvature) = curvature {
-            set(&estimation, "curvature", Buffer::from(curvature));
+            crate::estimate::estimate(&Points::from_f32(positions.numbers("positions", 3)?)?, &options, progress)
         }
-        if let Some(components) = components {
-            // Four bytes are four bytes.
-            set(&estimation, "components", Buffer::from(bytemuck::cast_vec::<u32, f32>(components)));
-        }
-        set(&estimation, "report", describe(&report));
-        Ok(estimation)
-    })
+    })?;
+    let estimation = Object::new();
+    set(&estimation, "normals", Buffer::from(normals));
+    if let Some(curvature) = curvature {
+        set(&estimation, "curvature", Buffer::from(curvature));
+    }
+    if let Some(components) = components {
+        // Four bytes are four bytes.
+        set(&estimation, "components", Buffer::from(bytemuck::cast_vec::<u32, f32>(components)));
+    }
+    set(&estimation, "report", describe(&report));
+    Ok(estimation)
 }
 
 #[optimize(size)]

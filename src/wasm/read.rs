@@ -15,11 +15,9 @@ pub fn read_ply(
     #[wasm_bindgen(js_name = maxPoints)] max_points: Option<f64>,
     #[wasm_bindgen(unchecked_param_type = "(phase: string, fraction: number) => void")] tell: &Function,
 ) -> Result<Object, JsValue> {
-    call(tell, |progress| {
-        let max_points = max_points.map(whole).transpose()?;
-        let cloud = ply::read(file.bytes(), &ReadOptions { max_points }, progress)?;
-        Ok(describe(cloud))
-    })
+    let max_points = max_points.map(whole).transpose()?;
+    let cloud = call(tell, move |progress| ply::read(file.bytes(), &ReadOptions { max_points }, progress))?;
+    Ok(describe(cloud))
 }
 
 fn describe(cloud: PointCloud) -> Object {
