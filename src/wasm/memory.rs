@@ -50,15 +50,6 @@ unsafe impl GlobalAlloc for Counting {
         }
         block
     }
-
-    unsafe fn realloc(&self, block: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        let moved = unsafe { System.realloc(block, aligned(layout), size) };
-        if !moved.is_null() {
-            USED.fetch_sub(layout.size(), Relaxed);
-            add(size);
-        }
-        moved
-    }
 }
 
 /// Starts a new measurement of [`peak`].
