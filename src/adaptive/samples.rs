@@ -191,17 +191,10 @@ impl Window {
         })
     }
 
-    /// Sums up, times the weight, the samples' variances along the vectors `direction(x, y, z, weight)`.
+    /// Sums up `terms(x, y, z, weight; spread)` over all samples, the spread in the order xx, yy, zz, yz, xz, xy.
     #[inline(always)]
-    pub fn sum_spread(&self, direction: impl Fn(Lanes) -> [Vec4; 3]) -> f64 {
-        let [sum] = self.sum_lanes(|i| {
-            let lanes = self.lanes(i);
-            let [a, b, c] = direction(lanes);
-            let squares = a * a * self.four(4, i) + b * b * self.four(5, i) + c * c * self.four(6, i);
-            let products = b * c * self.four(7, i) + a * c * self.four(8, i) + a * b * self.four(9, i);
-            [lanes[3] * (squares + 2.0 * products) / (a * a + b * b + c * c)]
-        });
-        sum
+    pub fn sum_with_spread<const N: usize>(&self, terms: impl Fn(Lanes, [Vec4; 6]) -> [Vec4; N]) -> [f64; N] {
+        self.sum_lanes(|i| terms(self.lanes(i), [4, 5, 6, 7, 8, 9].map(|number| self.four(number, i))))
     }
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! A quadratic surface through the samples of a neighbourhood, and how much its normals are to be trusted.
 
-use super::matrix::{Matrix, times_lanes};
+use super::matrix::{Matrix, dot_lanes, times_lanes};
 use super::samples::Window;
 use crate::pca::Symmetric;
 use bytemuck::{Pod, Zeroable};
@@ -143,10 +143,10 @@ impl Window {
             let mut noise = residual;
             // Else each sample is one point.
             if points > count {
-                let within = self.within(&surface.quadric, total);
+                let (within, between) = self.spread(&surface.quadric, total);
                 noise += within;
                 // Lack of fit: the variance of a point, told by the samples' distances and by the spread in each.
-                let between = residual * points / count;
+                let between = between * points / (count - 6.0);
                 let own = within * points / (points - count);
                 surface.lacks_detail = between > own * (1.0 + 3.0 * (2.0 / (count - 6.0)).sqrt()) + FIT * FIT;
             }
@@ -221,15 +221,26 @@ impl Window {
         Some(Fit { coefficients, variances, residual: (hh - explained).max(0.0) })
     }
 
-    /// The mean variance, across the surface, of the points behind the samples.
-    fn within(&self, quadric: &Quadric, total: f64) -> f64 {
+    /// The mean variance, across the surface, of the points behind the samples, and that of the samples: each against
+    /// the mean of the surface over its points, which where it bends is not the surface at their mean.
+    fn spread(&self, quadric: &Quadric, total: f64) -> (f64, f64) {
         let Quadric { centre, slope, bend, .. } = *quadric;
-        let sum = self.sum_spread(|[x, y, z, _]| {
-            let [x, y, z] = times_lanes(bend.splat(), [x - centre.x, y - centre.y, z - centre.z]);
-            [x + slope.x, y + slope.y, z + slope.z]
+        let [within, height, between] = self.sum_with_spread(|[x, y, z, w], [xx, yy, zz, yz, xz, xy]| {
+            let d = [x - centre.x, y - centre.y, z - centre.z];
+            let [a, b, c] = times_lanes(bend.splat(), d);
+            let Matrix { diagonal, off } = bend;
+            let sag = diagonal.x * xx + diagonal.y * yy + diagonal.z * zz + 2.0 * (off.x * yz + off.y * xz + off.z * xy);
+            let height = dot_lanes(d, slope.to_array().map(Vec4::splat)) + 0.5 * (dot_lanes(d, [a, b, c]) + sag);
+            let (a, b, c) = (a + slope.x, b + slope.y, c + slope.z);
+            let squares = a * a * xx + b * b * yy + c * c * zz;
+            let products = b * c * yz + a * c * xz + a * b * xy;
+            let square = a * a + b * b + c * c;
+            [w * (squares + 2.0 * products) / square, w * height, w * height * height]
         });
+        let share = 1.0 / total;
+        let height = share * height;
         // Rounding may leave less than nothing.
-        (sum / total).max(0.0)
+        ((share * within).max(0.0), (share * between - height * height).max(0.0))
     }
 }
 
