@@ -38,7 +38,14 @@ pub(crate) fn parse(text: &[u8], single: bool) -> Option<(f64, usize)> {
             exponent += if negative { -power } else { power };
         }
     }
-    let short = if count > 19 { None } else { short_way(mantissa, exponent) };
+    let short = if count > 19 {
+        None
+    } else if mantissa < 1 << 53 && (-22..=0).contains(&exponent) {
+        // Most numbers there are, as below: exact by exact, rounded once.
+        Some(mantissa as f64 / super::POWERS[exponent.unsigned_abs() as usize])
+    } else {
+        short_way(mantissa, exponent)
+    };
     // Rounding twice is rounding once, unless the first time leads just between two singles.
     let sure = short.filter(|value| !single || *value == 0.0 || !is_between_singles(*value));
     let value = sure.unwrap_or_else(|| long_way(&text[start..end], exponent, Precision::of(single)));
