@@ -16,6 +16,8 @@ export interface Platform {
 export interface Loaded {
   glue: Glue;
   memory: WebAssembly.Memory;
+  /** Bytes that the memory may grow to. */
+  most: number;
   mode: Mode;
 }
 
@@ -48,11 +50,11 @@ async function loadThreads(threads: number, start: Start, platform: Platform): P
     import('./threads/bilinormal.js' as string),
     compile(start, 'threads', core, full, platform),
   ]);
-  const memory = await begin(glue, module, createMemory(start, true));
+  const [memory, most] = await begin(glue, module, createMemory(start, true));
   pool.start = platform.startThread;
   pool.channel = start.channel;
   await glue.initThreadPool(threads);
-  return { glue, memory, mode: { mode: 'threads', threads } };
+  return { glue, memory, most, mode: { mode: 'threads', threads } };
 }
 
 async function loadSingle(start: Start, platform: Platform, mode: Mode): Promise<Loaded> {
@@ -62,14 +64,14 @@ async function loadSingle(start: Start, platform: Platform, mode: Mode): Promise
     import('./single/bilinormal.js' as string),
     compile(start, 'single', core, full, platform),
   ]);
-  const memory = await begin(glue, module, createMemory(start, false));
-  return { glue, memory, mode };
+  const [memory, most] = await begin(glue, module, createMemory(start, false));
+  return { glue, memory, most, mode };
 }
 
 async function begin(glue: Glue, module: WebAssembly.Module, [memory, pages]: ReturnType<typeof createMemory>) {
   await glue.default({ module_or_path: module, memory });
   glue.setMaximum(pages);
-  return memory;
+  return [memory, pages * 65536] as const;
 }
 
 // Not streamed: that would refuse servers which send .wasm under another media type, for a file this small.

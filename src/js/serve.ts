@@ -8,6 +8,9 @@ import type { Buffer, Tell } from './wasm.js';
 /** Blobs are read in pieces of this size, so that a file is never whole in JavaScript memory. */
 const pieceBytes = 1 << 23;
 
+/** What a point takes at the least: its position, its place in the grid and its normal (src/estimate.rs). */
+const leastBytes = 40;
+
 /** Returns the receiver of messages. */
 export function serve(post: (reply: Reply, transfer: Transferable[]) => void, platform: Platform) {
   let loaded: Promise<Loaded>;
@@ -35,7 +38,7 @@ export function serve(post: (reply: Reply, transfer: Transferable[]) => void, pl
   };
 }
 
-async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Platform, tell: Tell): Promise<object> {
+async function answer(call: Call, { glue, memory, most, mode }: Loaded, platform: Platform, tell: Tell): Promise<object> {
   // Made anew for each use: a view of memory that has grown since is empty.
   const view = ({ pointer, byteLength }: Buffer) => new Uint8Array(memory.buffer, pointer, byteLength);
 
@@ -90,6 +93,13 @@ async function answer(call: Call, { glue, memory, mode }: Loaded, platform: Plat
     case 'hello':
       return mode;
     case 'estimate': {
+      const points = call.positions.byteLength / (call.double ? 24 : 12);
+      const needed = points * leastBytes;
+      if (needed > most) {
+        // At once, and with what the whole takes.
+        const message = `${points} points do not fit into memory; use fewer points, or a 64-bit native build`;
+        throw Object.assign(coded('limit', message), { needed, available: most });
+      }
       const positions = put(call.positions);
       // The normals need just as much, and memory that is new to the system takes several times as long to write to.
       const used = call.double ? undefined : call.positions;

@@ -388,9 +388,15 @@ test('a file with an error says where', async () => {
 test('too little memory is a limit error with numbers, and the estimator stays usable', async (context) => {
   for (const threads of [1, 2]) {
     const estimator = await estimatorFor(context, { threads, memoryMaxMiB: 16 });
+    // Refused beforehand, with what the whole takes; and what may fit but does not, with what was lacking.
     await assert.rejects(estimator.estimateNormals(new Float32Array(3e6 * 3)), (error) => {
       failing('limit', /memory/)(error);
-      return error.needed >= 36e6;
+      assert.deepEqual([error.needed, error.available], [120e6, 2 ** 24]);
+      return true;
+    });
+    await assert.rejects(estimator.estimateNormals(sphere(400_000)), (error) => {
+      failing('limit', /memory/)(error);
+      return error.needed > 0 && error.available < 2 ** 24;
     });
     const { report } = await estimator.estimateNormals(sphere(1000));
     assert.equal(report.points, 1000);
