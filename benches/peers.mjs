@@ -2,18 +2,19 @@
 // points in one run, as docs/peers.md. They are installed into .tools, the first three by a Python there. With --small it takes
 // a minute, and says little.
 
-import { existsSync, mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
+import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { availableParallelism, tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { parseArgs } from 'node:util';
 import { build } from '../scripts/build.mjs';
-import { fromUser, main, root, run, tell, tools } from '../scripts/run.mjs';
+import { fromUser, main, root, tell } from '../scripts/run.mjs';
 import { setupPython } from '../scripts/python.mjs';
 import { setup } from '../scripts/setup.mjs';
 import { sorted, sphere } from './clouds.mjs';
 import { machine } from './machine.mjs';
 import { median } from './median.mjs';
 import { paragraphs, table, verdict } from './paper/format.mjs';
+import { setupNpm } from './peers/npm.mjs';
 import { linesOf } from './peers/run.mjs';
 
 const PCL = 'pcl.js@1.16.0';
@@ -33,16 +34,6 @@ const OURS = {
 const RUNS = 5;
 
 const times = (ratio) => ratio.toFixed(ratio < 9.95 ? 1 : 0);
-
-/** pcl.js on a CommonJS path of its own; it is no dependency of ours. */
-function setupPcl() {
-  const folder = join(tools, 'pcl');
-  if (!existsSync(join(folder, 'node_modules', 'pcl.js'))) {
-    tell(`set-up: ${PCL} into .tools, to compare with`);
-    run('npm', ['install', '--no-save', '--no-audit', '--no-fund', '--loglevel=error', `--prefix=${folder}`, PCL]);
-  }
-  return folder;
-}
 
 /** The seconds of each run of ours, what the caller waits for: by name. */
 async function measureOurs(createEstimator, positions, threads) {
@@ -122,7 +113,7 @@ await main(async () => {
   const { values } = parseArgs({ options: { small: { type: 'boolean' }, out: { type: 'string' } } });
   setup();
   build();
-  const [python, pcl] = [setupPython(), setupPcl()];
+  const [python, pcl] = [setupPython(), setupNpm('pcl', [PCL])];
   const { createEstimator } = await import('../dist/node.js');
   const folder = mkdtempSync(join(tmpdir(), 'bilinormal-'));
   const rows = [];

@@ -1,16 +1,32 @@
 // One measurement, the same in Node and in a browser.
 
 /** Runs an estimate several times after one that is not counted; gives the report of each. */
-export async function measure(createEstimator, { positions, cell, runs, threads }) {
+export async function measure(createEstimator, { positions, options, runs, threads }) {
   const estimator = await createEstimator({ threads });
   try {
     const reports = [];
     for (let run = 0; run <= runs; run++) {
-      const { report } = await estimator.estimateNormals(positions, { cell });
+      const { report } = await estimator.estimateNormals(positions, options);
       if (run > 0) reports.push(report);
     }
     return reports;
   } finally {
     estimator.dispose();
   }
+}
+
+/** The limit: milliseconds of each of some runs that copy the positions into wasm memory, and as much out of it. */
+export function measureCopy(positions, runs) {
+  const { buffer, byteOffset, byteLength } = positions;
+  const outside = new Uint8Array(buffer, byteOffset, byteLength);
+  const memory = new WebAssembly.Memory({ initial: Math.ceil(byteLength / 65536) });
+  const inside = new Uint8Array(memory.buffer, 0, byteLength);
+  const times = [];
+  for (let run = 0; run <= runs; run++) {
+    const start = performance.now();
+    inside.set(outside);
+    inside.slice();
+    if (run > 0) times.push(performance.now() - start);
+  }
+  return times;
 }

@@ -38,7 +38,12 @@ export function serve(post: (reply: Reply, transfer: Transferable[]) => void, pl
   };
 }
 
-async function answer(call: Call, { glue, memory, most, mode }: Loaded, platform: Platform, tell: Tell): Promise<object> {
+async function answer(
+  call: Call,
+  { glue, memory, most, mode }: Loaded,
+  platform: Platform,
+  tell: Tell,
+): Promise<object> {
   // Made anew for each use: a view of memory that has grown since is empty.
   const view = ({ pointer, byteLength }: Buffer) => new Uint8Array(memory.buffer, pointer, byteLength);
 
