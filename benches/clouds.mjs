@@ -15,7 +15,7 @@ export function sphere(count) {
   return points;
 }
 
-/** The same points in Morton order, 10 bits an axis: neighbours in space are neighbours in memory. */
+/** The same points, at most 2^26, in Morton order, 9 bits an axis: neighbours in space are neighbours in memory. */
 export function sorted(points) {
   const count = points.length / 3;
   const spread = (value) => {
@@ -24,16 +24,16 @@ export function sorted(points) {
     value = (value | (value << 4)) & 0x030c30c3;
     return (value | (value << 2)) & 0x09249249;
   };
-  const place = (coordinate) => spread(Math.min(1023, Math.floor((coordinate + 1) * 512)));
+  const place = (coordinate) => spread(Math.min(511, Math.floor((coordinate + 1) * 256)));
   const keys = new Float64Array(count);
   for (let i = 0; i < count; i++) {
     const code = place(points[3 * i]) + 2 * place(points[3 * i + 1]) + 4 * place(points[3 * i + 2]);
-    keys[i] = code * 2 ** 23 + i;
+    keys[i] = code * 2 ** 26 + i;
   }
   keys.sort();
   const result = new Float32Array(points.length);
   keys.forEach((key, to) => {
-    const from = key % 2 ** 23;
+    const from = key % 2 ** 26;
     result.set(points.subarray(3 * from, 3 * from + 3), 3 * to);
   });
   return result;

@@ -1,4 +1,4 @@
-//! The native rows of `npm run bench` (benches/run.mjs): estimates the normals of a file of raw 32-bit coordinates.
+//! The native rows of `npm run bench` (benches/speed/engines.mjs): estimates the normals of a file of raw 32-bit coordinates.
 //!
 //! Usage: `cargo bench --bench native -- FILE CELL RUNS THREADS`, with CELL `auto` or a multiple of L. Prints one JSON
 //! object a run on standard output, after one run that is not counted.

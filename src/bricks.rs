@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::lattice::Lattice;
 use crate::parallel::{self, Filling, Gathering};
-use crate::points::{CHUNK, Points, reserve};
+use crate::points::{CHUNK, Points, fitted, reserve};
 use crate::progress::Stage;
 use glam::IVec3;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -72,11 +72,11 @@ impl Layout {
     }
 }
 
-/// The slot of a point that lies in no brick.
+/// The key of a point that lies in no brick.
 pub(crate) const OUTSIDE: u32 = u32::MAX;
 
 impl Bricks {
-    /// Finds the bricks of all points, and for each point the slot of its brick, [`OUTSIDE`] if it has none. One pass,
+    /// Finds the bricks of all points, and for each point the key of its brick, [`OUTSIDE`] if it has none. One pass,
     /// parallel, two where the box is nearly empty.
     pub fn find(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
         let layout = Layout::of(lattice);
@@ -94,7 +94,7 @@ impl Bricks {
         let mut bits: Vec<AtomicU64> = Vec::new();
         reserve(&mut bits, count, "the grid")?;
         bits.resize_with(count, AtomicU64::default);
-        let slots = Filling::<u32>::new(points.len(), "the sorting keys")?;
+        let keys = Filling::<u32>::new(points.len(), "the sorting keys")?;
         stage.run(points.chunks(), &|i| {
             for point in parallel::piece(points.len(), CHUNK, i) {
                 let mut key = OUTSIDE;
@@ -108,11 +108,11 @@ impl Bricks {
                     }
                 }
                 // SAFETY: each point belongs to one chunk.
-                unsafe { slots.write(point, key) };
+                unsafe { keys.write(point, key) };
             }
         })?;
         // SAFETY: the chunks hold all points.
-        let slots = unsafe { slots.complete() };
+        let keys = unsafe { keys.complete() };
 
         let bits: Vec<u64> = bits.into_iter().map(AtomicU64::into_inner).collect();
         let mut before = Vec::new();
@@ -128,7 +128,7 @@ impl Bricks {
             places.extend(set_bits(word).map(|bit| layout.brick(64 * i + bit as usize)));
         }
 
-        Ok((Self { places, index: Index::Box { layout, bits, before } }, slots))
+        Ok((Self { places, index: Index::Box { layout, bits, before } }, keys))
     }
 
     fn in_table(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
@@ -148,7 +148,7 @@ impl Bricks {
         })?;
         let mut places = found.all()?;
         sort(&mut places);
-        places.shrink_to_fit();
+        let places = fitted(&places, "the grid")?;
 
         let mut slots = Vec::new();
         let length = (2 * places.len()).next_power_of_two();
@@ -176,12 +176,13 @@ impl Bricks {
         Ok((bricks, keys))
     }
 
-    /// The number of the brick in a slot that [`Bricks::find`] answered with.
+    /// The number of the brick with a key that [`Bricks::find`] answered with.
     #[inline(always)]
-    pub fn in_slot(&self, slot: u32) -> u32 {
+    pub fn number_of_key(&self, key: u32) -> u32 {
         match &self.index {
-            Index::Box { bits, before, .. } => rank(bits, before, slot as usize),
-            Index::Table { .. } => slot,
+            Index::Box { bits, before, .. } => rank(bits, before, key as usize),
+            // It is the number.
+            Index::Table { .. } => key,
         }
     }
 

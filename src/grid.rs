@@ -66,8 +66,8 @@ impl Grid {
     /// All but the ends of the cubes.
     #[optimize(size)]
     fn sort_points(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<Self, Error> {
-        let (bricks, slots) = Bricks::find(points, lattice, &stage.part(0.0..0.4))?;
-        let (first_point, mut placed) = sort_by_brick(points, lattice, &bricks, slots, &stage.part(0.4..0.8))?;
+        let (bricks, keys) = Bricks::find(points, lattice, &stage.part(0.0..0.4))?;
+        let (first_point, mut placed) = sort_by_brick(points, lattice, &bricks, keys, &stage.part(0.4..0.8))?;
         let masks = sort_by_cube(&mut placed, &first_point, &stage.part(0.8..1.0))?;
 
         let mut first_cube = Vec::new();
@@ -187,7 +187,7 @@ fn sort_by_brick(
     points: &Points,
     lattice: &Lattice,
     bricks: &Bricks,
-    mut slots: Vec<u32>,
+    mut keys: Vec<u32>,
     stage: &Stage,
 ) -> Result<(Vec<u32>, Vec<Placed>), Error> {
     let count = points.len();
@@ -200,18 +200,17 @@ fn sort_by_brick(
     let mut counts: Vec<u32> = Vec::new();
     reserve(&mut counts, pieces * bricks.len(), "the grid")?;
     counts.resize(pieces * bricks.len(), 0);
-    let (shared, keys) = (Scatter::new(&mut counts), Scatter::new(&mut slots));
+    let (shared, numbers) = (Scatter::new(&mut counts), Scatter::new(&mut keys));
     stage.part(0.0..0.15).run(pieces, &|i| {
         // SAFETY: each piece counts in its own part, and reads its own points.
-        let (counts, keys) = unsafe { (shared.slice(of_piece(i)), keys.slice(parallel::piece(count, size, i))) };
+        let (counts, keys) = unsafe { (shared.slice(of_piece(i)), numbers.slice(parallel::piece(count, size, i))) };
         for key in keys {
             if *key != OUTSIDE {
-                *key = bricks.in_slot(*key);
+                *key = bricks.number_of_key(*key);
                 counts[*key as usize] += 1;
             }
         }
     })?;
-    let keys = slots;
 
     // Where each piece writes its first point of each brick.
     let mut first_point = Vec::new();
@@ -258,7 +257,7 @@ fn sort_by_cube(placed: &mut [Placed], first_point: &[u32], stage: &Stage) -> Re
             let points = unsafe { placed.slice(first_point[brick] as usize..first_point[brick + 1] as usize) };
             // A copy of one brick, so mostly in the nearest cache.
             unsorted.clear();
-            if unsorted.try_reserve(points.len()).is_err() {
+            if unsorted.try_reserve_exact(points.len()).is_err() {
                 lacking.store(size_of_val(points), Relaxed);
                 return;
             }

@@ -90,6 +90,14 @@ pub(crate) fn grow<T>(items: &mut Vec<T>, count: usize, what: &str) -> Result<()
     items.try_reserve(count).map_err(|_| Error::memory(what, needed))
 }
 
+/// The same list without room to grow, or how much memory that lacked.
+pub(crate) fn fitted<T: Copy>(items: &[T], what: &str) -> Result<Vec<T>, Error> {
+    let mut fitted = Vec::new();
+    reserve(&mut fitted, items.len(), what)?;
+    fitted.extend_from_slice(items);
+    Ok(fitted)
+}
+
 /// A list of `count` times the same, or how much memory was needed.
 pub(crate) fn filled<T: Clone>(value: T, count: usize, what: &str) -> Result<Vec<T>, Error> {
     let mut items = Vec::new();

@@ -1,4 +1,4 @@
-// From a file in the page's hands to normals on the GPU, beside the same estimate alone.
+// From a file in the page's hands to normals for the GPU, beside the same estimate alone.
 
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -9,7 +9,7 @@ import { measureThere } from './engines.mjs';
 import { binaryPly } from './ply.mjs';
 
 /**
- * `{ points, whole, estimate }`: milliseconds, medians, from the choice of a file to the end of the upload of its normals,
+ * `{ points, whole, estimate }`: milliseconds, medians, from the choice of a file until its normals were handed to WebGL,
  * each time with a page that was just opened, and of the same estimate alone.
  */
 export async function measureDrop({ browser, page }, positions, folder, runs) {
@@ -25,6 +25,8 @@ export async function measureDrop({ browser, page }, positions, folder, runs) {
       await fresh.addInitScript(watchUploads);
       await fresh.goto(server.url);
       await fresh.waitForFunction(() => !document.querySelector('[data-do=choose]').disabled);
+      // As long as a person takes to find a file, or less.
+      await fresh.waitForTimeout(3_000);
       await fresh.locator('#file').setInputFiles(join(root, file));
       const found = await fresh.waitForFunction((bytes) => globalThis.uploaded(bytes), positions.byteLength, {
         timeout: 120_000,
@@ -47,7 +49,7 @@ export async function measureDrop({ browser, page }, positions, folder, runs) {
  * there is no GPU, as on servers, drawing takes the processors that the estimate needs.
  */
 function watchUploads() {
-  WebGL2RenderingContext.prototype.drawArrays = () => {};
+  WebGL2RenderingContext.prototype.drawArrays = WebGL2RenderingContext.prototype.drawElements = () => {};
   let chosen;
   const uploads = [];
   addEventListener('change', () => (chosen = performance.now()), { capture: true });

@@ -221,8 +221,8 @@ impl Window {
         Some(Fit { coefficients, variances, residual: (hh - explained).max(0.0) })
     }
 
-    /// The mean variance, across the surface, of the points behind the samples, and that of the samples: each against
-    /// the mean of the surface over its points, which where it bends is not the surface at their mean.
+    /// The mean variance, across the surface, of the points behind the samples, and the variance of the samples' heights
+    /// over it: each over the mean of the surface at its points, which where it bends is not the surface at their mean.
     fn spread(&self, quadric: &Quadric, total: f64) -> (f64, f64) {
         let Quadric { centre, slope, bend, .. } = *quadric;
         let [within, height, between] = self.sum_with_spread(|[x, y, z, w], [xx, yy, zz, yz, xz, xy]| {
@@ -330,16 +330,19 @@ mod tests {
 
     /// A window of points, each a sample.
     fn window(points: impl Iterator<Item = Vec3>) -> Window {
-        let points: Vec<Vec3> = points.collect();
-        let samples = Writing::new(points.len()).unwrap();
-        for (i, point) in points.iter().enumerate() {
+        window_of(&points.map(Sample::point).collect::<Vec<_>>())
+    }
+
+    fn window_of(list: &[Sample]) -> Window {
+        let samples = Writing::new(list.len()).unwrap();
+        for (i, sample) in list.iter().enumerate() {
             // SAFETY: each once.
-            unsafe { samples.write(i, Sample::point(*point)) };
+            unsafe { samples.write(i, *sample) };
         }
         // SAFETY: all were written.
         let samples = unsafe { samples.complete() };
         let mut window = Window::new();
-        window.add(&samples, 0..points.len(), Vec3::ZERO, 1.0);
+        window.add(&samples, 0..list.len(), Vec3::ZERO, 1.0);
         window
     }
 
@@ -384,6 +387,25 @@ mod tests {
             made += gradient.normalize().truncate().length_squared();
         }
         assert!((0.7..1.8).contains(&(claimed / made)), "{} times", claimed / made);
+    }
+
+    /// Samples of many points: where the surface bends, their centroids lie off it, each by as much as it spreads.
+    #[test]
+    fn detail_is_missed_at_a_crease_and_not_in_a_bowl() {
+        let lacks_detail = |height: fn(f32, f32) -> f32| {
+            let mut samples = Vec::new();
+            for (u, v) in grid(6) {
+                // From a narrow sample to one as wide as half a cube.
+                let width = 0.05 + 0.2 * (u * 7.3 + v * 3.1).sin().abs();
+                let points = (0..9).map(|i| (1.4 * u + width * (i % 3 - 1) as f32, 1.4 * v + width * (i / 3 - 1) as f32));
+                samples.push(Sample::of(points.map(|(x, y)| Sample::point(Vec3::new(x, y, height(x, y))))));
+            }
+            window_of(&samples).fit().unwrap().lacks_detail
+        };
+        assert!(!lacks_detail(|_, _| 0.1));
+        assert!(!lacks_detail(|x, y| 0.1 * x * x + 0.15 * y * y));
+        assert!(!lacks_detail(|x, y| 0.1 * x * x - 0.05 * y * y));
+        assert!(lacks_detail(|x, _| 0.1 * x.abs()));
     }
 
     #[test]

@@ -17,7 +17,10 @@ export function own(from: ArrayBufferLike | ArrayBufferView, take?: boolean): Ui
   const { buffer = from as ArrayBuffer, byteOffset = 0, byteLength } = from as ArrayBufferView;
   try {
     const bytes = new Uint8Array(buffer, byteOffset, byteLength);
-    return take && byteLength === buffer.byteLength && kindOf(buffer) === 'ArrayBuffer'
+    return take &&
+      byteLength === buffer.byteLength &&
+      kindOf(buffer) === 'ArrayBuffer' &&
+      !(buffer as { resizable?: boolean }).resizable
       ? new Uint8Array(structuredClone(buffer as ArrayBuffer, { transfer: [buffer as ArrayBuffer] }))
       : bytes.slice();
   } catch (error) {

@@ -5,7 +5,7 @@ use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::parallel::Filling;
-use crate::points::{grow, reserve};
+use crate::points::{fitted, grow, reserve};
 use crate::progress::Stage;
 use crate::surroundings::{NEAR, Places, Surroundings};
 use glam::{Vec3, Vec4Swizzles};
@@ -82,8 +82,7 @@ impl Links {
                     unsafe { runs.write(own, Run { list: block, start, end: links.len() }) };
                 }
             }
-            links.shrink_to_fit();
-            Ok(links)
+            fitted(&links, GRAPH)
         })?;
         // SAFETY: the blocks hold all cubes, and these all patches.
         Ok(Self { runs: unsafe { runs.complete() }, lists })

@@ -16,7 +16,7 @@ pub fn read_ply(
     #[wasm_bindgen(unchecked_param_type = "(phase: string, fraction: number) => void")] tell: &Function,
 ) -> Result<Object, JsValue> {
     let max_points = max_points.map(whole).transpose()?;
-    let cloud = call(tell, move |progress| ply::read(file.bytes(), &ReadOptions { max_points }, progress))?;
+    let cloud = call(tell, |progress| ply::read(file.bytes(), &ReadOptions { max_points }, progress))?;
     Ok(describe(cloud))
 }
 

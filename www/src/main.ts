@@ -67,6 +67,7 @@ function start(viewer: Viewer): void {
   });
 
   if (new URLSearchParams(location.search).has('sample')) void session.openSample();
+  else session.warm();
 }
 
 /** What the panel and the status line cover: the right edge and a corner, or on a small screen top and bottom. */

@@ -9,6 +9,8 @@ import { UNTURNED, type Store, type Turned } from './state';
 import type { Viewer } from './viewer';
 
 export interface Session {
+  /** Starts the workers, so that the first file need not wait for them. */
+  warm(): void;
   open(file: File): Promise<void>;
   openSample(): Promise<void>;
   /** Computes the normals of the cloud on the screen again, with the options that are set now. */
@@ -142,6 +144,13 @@ export function createSession(store: Store, viewer: Viewer): Session {
   }
 
   return {
+    warm() {
+      // One for files and plain normals, one for signs. What goes wrong here goes wrong again with a file, and is told then.
+      for (const orient of ['none', 'consistent'] as const) {
+        estimateNormals(new Float32Array(), { orient }).catch(() => {});
+      }
+    },
+
     open: (file) =>
       run(file.name, async (step) => {
         await show(file, step);
