@@ -229,7 +229,8 @@ impl Window {
             let d = [x - centre.x, y - centre.y, z - centre.z];
             let [a, b, c] = times_lanes(bend.splat(), d);
             let Matrix { diagonal, off } = bend;
-            let sag = diagonal.x * xx + diagonal.y * yy + diagonal.z * zz + 2.0 * (off.x * yz + off.y * xz + off.z * xy);
+            let sag =
+                diagonal.x * xx + diagonal.y * yy + diagonal.z * zz + 2.0 * (off.x * yz + off.y * xz + off.z * xy);
             let height = dot_lanes(d, slope.to_array().map(Vec4::splat)) + 0.5 * (dot_lanes(d, [a, b, c]) + sag);
             let (a, b, c) = (a + slope.x, b + slope.y, c + slope.z);
             let squares = a * a * xx + b * b * yy + c * c * zz;
@@ -397,7 +398,8 @@ mod tests {
             for (u, v) in grid(6) {
                 // From a narrow sample to one as wide as half a cube.
                 let width = 0.05 + 0.2 * (u * 7.3 + v * 3.1).sin().abs();
-                let points = (0..9).map(|i| (1.4 * u + width * (i % 3 - 1) as f32, 1.4 * v + width * (i / 3 - 1) as f32));
+                let points =
+                    (0..9).map(|i| (1.4 * u + width * (i % 3 - 1) as f32, 1.4 * v + width * (i / 3 - 1) as f32));
                 samples.push(Sample::of(points.map(|(x, y)| Sample::point(Vec3::new(x, y, height(x, y))))));
             }
             window_of(&samples).fit().unwrap().lacks_detail

@@ -97,9 +97,9 @@ test('curvature where it is asked for: beside the same normals, within its bound
     assert.ok(curvature instanceof Float32Array && curvature.buffer.constructor === ArrayBuffer);
     assert.equal(curvature.length, 30000);
     assert.equal(curvature[1000], 0, 'an unresolved point');
-    // On a sphere about k / (6 N).
+    // On a sphere about k / (6 N), and a neighbourhood of 27 cubes holds some 500 points.
     assert.ok(
-      curvature.every((value, i) => i === 1000 || (value > 1e-6 && value < 0.005)),
+      curvature.every((value, i) => i === 1000 || (value > 1e-6 && value < 0.008)),
       method,
     );
     assert.ok(sameBits(curvature, (await threads.estimateNormals(positions, { method, curvature: true })).curvature));
