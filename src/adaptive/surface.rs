@@ -94,6 +94,9 @@ const STRIP_ERROR: f64 = 0.3;
 /// No surface is known to less than so many edges.
 const FIT: f64 = 0.003;
 
+/// Nor is detail missed where it is smaller than so many: to look for it would cost more than it is worth.
+const DETAIL: f64 = 0.001;
+
 impl Window {
     /// The surface that fits the samples best: the plane of the principal components, then by least squares the height
     /// over it as a quadratic function.
@@ -148,7 +151,7 @@ impl Window {
                 // Lack of fit: the variance of a point, told by the samples' distances and by the spread in each.
                 let between = between * points / (count - 6.0);
                 let own = within * points / (points - count);
-                surface.lacks_detail = between > own * (1.0 + 3.0 * (2.0 / (count - 6.0)).sqrt()) + FIT * FIT;
+                surface.lacks_detail = between > own * (1.0 + 3.0 * (2.0 / (count - 6.0)).sqrt()) + DETAIL * DETAIL;
             }
             surface.noise = noise as f32;
             surface.is_curved = true;

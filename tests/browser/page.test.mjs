@@ -256,7 +256,7 @@ test('curvature is computed to be shown, for the normals that are there, and sav
   assert.ok(await choice.isEnabled());
   // What is chosen but not yet computed is not for the curvature either.
   await page.getByRole('radio', { name: '× L' }).check();
-  await page.getByRole('textbox', { name: 'multiples of L' }).fill('3');
+  await page.getByRole('textbox', { name: 'multiples of L' }).fill('5');
   await page.getByRole('radio', { name: 'Plain' }).check();
   const plain = await colorsShown(page, { side: 300 });
   await pressWhen('Computing normals and curvature', 'cancel');
