@@ -3,7 +3,7 @@
 //
 // Time for each phase, points per second and bytes per point, of spheres in random and in sorted order and of a real
 // scan: native, and as WebAssembly in Node and in Chromium, with one thread and with as many as there are processors,
-// beside the time of bare copies in and out. Then the page, from a file to normals on the GPU.
+// beside the time of bare copies in and out. Then the page, from a file to normals handed to WebGL.
 
 import { existsSync, mkdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';

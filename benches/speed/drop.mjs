@@ -1,4 +1,4 @@
-// From a file in the page's hands to normals for the GPU, beside the same estimate alone.
+// From a file in the page's hands to normals in those of WebGL, beside the same estimate alone.
 
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -45,7 +45,7 @@ export async function measureDrop({ browser, page }, positions, folder, runs) {
 }
 
 /**
- * In the page: notes when a file was chosen, and when arrays of some size have been handed to the GPU. Nothing is drawn: where
+ * In the page: notes when a file was chosen, and when arrays of some size have been handed to WebGL. Nothing is drawn: where
  * there is no GPU, as on servers, drawing takes the processors that the estimate needs.
  */
 function watchUploads() {

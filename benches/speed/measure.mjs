@@ -15,7 +15,10 @@ export async function measure(createEstimator, { positions, options, runs, threa
   }
 }
 
-/** The limit: milliseconds of each of some runs that copy the positions into wasm memory, and as much out of it, between arrays that are in use. */
+/**
+ * The limit: milliseconds of each of some runs that copy the positions into wasm memory, and as much out of it, between
+ * arrays that are in use.
+ */
 export function measureCopy(positions, runs) {
   const { buffer, byteOffset, byteLength } = positions;
   const outside = new Uint8Array(buffer, byteOffset, byteLength);

@@ -10,7 +10,7 @@ const pieceBytes = 1 << 23;
 /** Asked for at once: each takes a way through another process, and Chromium reads two to three times as fast. */
 const piecesAhead = 4;
 
-/** What a point takes at the least: its position and its normal; and its place in the grid, if it is finite (src/estimate.rs). */
+/** What a point takes at the least: its position and its normal, and if it is finite its place in the grid. */
 const [anyBytes, finiteBytes] = [24, 16];
 
 /** Returns the receiver of messages. */
@@ -40,7 +40,7 @@ export function serve(post: (reply: Reply, transfer: Transferable[]) => void, pl
   };
 }
 
-/** Throws a `limit` error if the points of a call cannot fit, whatever they look like: at once, before anything is copied. */
+/** Throws a `limit` error if the points of a call cannot fit, however they lie: at once, before wasm gets them. */
 function refuse({ positions: { buffer }, double }: Extract<Call, { kind: 'estimate' }>, most: number) {
   const coordinates = double ? new Float64Array(buffer) : new Float32Array(buffer);
   const points = coordinates.length / 3;
