@@ -38,14 +38,7 @@ pub(crate) fn parse(text: &[u8], single: bool) -> Option<(f64, usize)> {
             exponent += if negative { -power } else { power };
         }
     }
-    let short = if count > 19 {
-        None
-    } else if mantissa < 1 << 53 && (-22..=0).contains(&exponent) {
-        // Most numbers there are, as below: exact by exact, rounded once.
-        Some(mantissa as f64 / super::POWERS[exponent.unsigned_abs() as usize])
-    } else {
-        short_way(mantissa, exponent)
-    };
+    let short = if count > 19 { None } else { short_way(mantissa, exponent) };
     // Rounding twice is rounding once, unless the first time leads just between two singles.
     let sure = short.filter(|value| !single || *value == 0.0 || !is_between_singles(*value));
     let value = sure.unwrap_or_else(|| long_way(&text[start..end], exponent, Precision::of(single)));
@@ -82,19 +75,27 @@ fn digits(text: &[u8], at: &mut usize, value: &mut u64) {
     }
 }
 
-/// `mantissa * 10^exponent`, correctly rounded; none if that is not sure.
+/// `mantissa * 10^exponent`, correctly rounded; none if that is not sure. Most numbers there are take the first branch, which
+/// belongs into the loop of the caller.
+#[inline(always)]
 pub(super) fn short_way(mantissa: u64, exponent: i64) -> Option<f64> {
+    if mantissa <= 1 << 53 && (-22..=22).contains(&exponent) {
+        // One exact number by another: the one rounding is the right one.
+        let (number, power) = (mantissa as f64, super::POWERS[exponent.unsigned_abs() as usize]);
+        Some(if exponent < 0 { number / power } else { number * power })
+    } else {
+        scaled_way(mantissa, exponent)
+    }
+}
+
+/// The same for numbers of more digits or larger powers.
+#[inline(never)]
+fn scaled_way(mantissa: u64, exponent: i64) -> Option<f64> {
     if mantissa == 0 {
         return Some(0.0);
     }
     let high = mantissa as f64;
-    let (value, lost) = if mantissa <= 1 << 53 && (-22..=22).contains(&exponent) {
-        // One exact number by another: the one rounding is the right one.
-        let power = super::POWERS[exponent.unsigned_abs() as usize];
-        return Some(if exponent < 0 { high / power } else { high * power });
-    } else {
-        scale(high, mantissa.wrapping_sub(high as u64) as i64 as f64, exponent)?
-    };
+    let (value, lost) = scale(high, mantissa.wrapping_sub(high as u64) as i64 as f64, exponent)?;
     // Far more than `scale` may be wrong by.
     let doubt = value * 2e-30;
     let (least, most) = (value + (lost - doubt), value + (lost + doubt));
