@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::grid::{Grid, Placed, octants};
 use crate::lattice::cube_centre;
 use crate::nodes::Node;
-use crate::normals::{Found, Normals};
+use crate::normals::{Found, Normals, Writer};
 use crate::progress::Stage;
 use crate::surroundings::{MIDDLE, Places, Surroundings};
 use glam::{Mat4, Vec3, Vec4, Vec4Swizzles};
@@ -27,7 +27,7 @@ pub(crate) fn interpolate(
     stage.run(grid.blocks.len(), &|block| {
         let mut surroundings = Surroundings::new();
         let mut good = GoodNodes::NONE;
-        let mut tally = Tally::default();
+        let (mut writer, mut tally) = (normals.writer(), Tally::default());
         for brick in grid.blocks[block].clone() {
             surroundings.look(grid, brick);
             good.fill(&surroundings, nodes);
@@ -35,7 +35,7 @@ pub(crate) fn interpolate(
                 good.add_variations(&surroundings, variations);
             }
             for (cube, (points, bit)) in (grid.first_cube[brick] as usize..).zip(grid.cubes_of(brick)) {
-                Cube::new(&good, &nodes[cube], bit).interpolate(points, &normals, &mut tally);
+                Cube::new(&good, &nodes[cube], bit).interpolate(points, &mut writer, &mut tally);
             }
         }
         all_used.iter().zip(tally.used).for_each(|(all, used)| _ = all.fetch_add(used, Relaxed));
@@ -211,7 +211,7 @@ impl<'a> Cube<'a> {
     /// Writes the normals of the points of the cube, and their curvature if it was asked for. Those of an octant, which lie
     /// one after the other, share its nodes; four at a time are computed at once.
     #[inline(always)]
-    fn interpolate(&self, points: &[Placed], normals: &Normals, tally: &mut Tally) {
+    fn interpolate(&self, points: &[Placed], normals: &mut Writer, tally: &mut Tally) {
         for (number, points) in octants(points, self.centre) {
             let Some(octant) = self.octant(number) else {
                 tally.used[0] += points.len() as u64;
@@ -360,7 +360,7 @@ impl Octant {
     // Apart from the normals: beside their loop it cost those who do not ask for it 10 % of the interpolation (wasm). One by
     // one: four at a time are no faster.
     #[inline(never)]
-    unsafe fn write_variations(self, points: &[Placed], u: usize, v: usize, normals: &Normals) {
+    unsafe fn write_variations(self, points: &[Placed], u: usize, v: usize, normals: &Writer) {
         for point in points {
             let place: &[f32; 3] = point.local.as_ref();
             let variation = self.variations(Vec4::splat(place[u]), Vec4::splat(place[v])).x;

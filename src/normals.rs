@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::parallel::{self, Filling};
 use crate::points::CHUNK;
-use glam::{Vec3, Vec4};
+use glam::{Mat4, Vec3, Vec4};
 use std::mem::MaybeUninit;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -43,47 +43,9 @@ impl Normals {
         Ok(Self { normals, curvature, resolved: AtomicU64::new(0) })
     }
 
-    /// Whether the curvature of each point was asked for, and must be written too.
-    pub fn has_curvature(&self) -> bool {
-        self.curvature.is_some()
-    }
-
-    /// Takes the normal of a point, of either sign, and its curvature; zero if nothing determines them.
-    ///
-    /// # Safety
-    /// At most once for each point.
-    #[inline(always)]
-    pub unsafe fn write(&self, point: u32, normal: Vec3, curvature: f32) {
-        // SAFETY: by the caller's promise.
-        unsafe {
-            self.write_lanes([point].into_iter(), normal.to_array().map(Vec4::splat));
-            self.write_curvature(point, curvature);
-        }
-    }
-
-    /// Takes the normals of up to four points, lane by lane, of either sign.
-    ///
-    /// # Safety
-    /// At most once for each point.
-    #[inline(always)]
-    pub unsafe fn write_lanes(&self, points: impl Iterator<Item = u32>, normals: [Vec4; 3]) {
-        let [x, y, z] = face(normals).map(|lanes| lanes.to_array());
-        for (i, point) in points.take(4).enumerate() {
-            // SAFETY: by the caller's promise.
-            unsafe { self.normals.write(point as usize, Vec3::new(x[i], y[i], z[i])) };
-        }
-    }
-
-    /// Takes the curvature of a point, unless it was not asked for.
-    ///
-    /// # Safety
-    /// At most once for each point.
-    #[inline(always)]
-    pub unsafe fn write_curvature(&self, point: u32, curvature: f32) {
-        if let Some(all) = &self.curvature {
-            // SAFETY: by the caller's promise.
-            unsafe { all.write(point as usize, curvature) };
-        }
+    /// For a task, which hands its normals over by it.
+    pub fn writer(&self) -> Writer<'_> {
+        Writer { normals: self, gathered: [Vec4::ZERO; GATHERED + 4], length: 0 }
     }
 
     /// Counts points that were given a normal other than zero.
@@ -101,6 +63,90 @@ impl Normals {
             unsafe { (self.normals.complete(), self.curvature.map(|curvature| curvature.complete())) };
         let normals = bytemuck::cast_vec::<Vec3, [f32; 3]>(normals).into_flattened();
         Found { normals, curvature, resolved: self.resolved.into_inner() }
+    }
+}
+
+/// How many normals are gathered before they are written: as many as the nearest cache holds without noticing.
+const GATHERED: usize = 252;
+
+/// Takes the normals of a task. They go to places all over the memory, and every place has to be waited for; of those
+/// that are written right after each other the processor waits for many at once.
+pub(crate) struct Writer<'a> {
+    normals: &'a Normals,
+    /// Of each point x, y, z and the bits of its number; those from `length` on mean nothing.
+    gathered: [Vec4; GATHERED + 4],
+    length: usize,
+}
+
+impl Writer<'_> {
+    /// Whether the curvature of each point was asked for, and must be written too.
+    pub fn has_curvature(&self) -> bool {
+        self.normals.curvature.is_some()
+    }
+
+    /// Takes the normal of a point, of either sign, and its curvature; zero if nothing determines them.
+    ///
+    /// # Safety
+    /// At most once for each point.
+    #[inline(always)]
+    pub unsafe fn write(&mut self, point: u32, normal: Vec3, curvature: f32) {
+        // SAFETY: by the caller's promise.
+        unsafe {
+            self.write_lanes([point].into_iter(), normal.to_array().map(Vec4::splat));
+            self.write_curvature(point, curvature);
+        }
+    }
+
+    /// Takes the normals of up to four points, lane by lane, of either sign.
+    ///
+    /// # Safety
+    /// At most once for each point.
+    #[inline(always)]
+    pub unsafe fn write_lanes(&mut self, points: impl Iterator<Item = u32>, normals: [Vec4; 3]) {
+        let [x, y, z] = face(normals);
+        let mut numbers = [0; 4];
+        let mut count = 0;
+        for (number, point) in numbers.iter_mut().zip(points) {
+            *number = point;
+            count += 1;
+        }
+        let rows = Mat4::from_cols(x, y, z, bytemuck::cast(numbers)).transpose();
+        let rows = [rows.x_axis, rows.y_axis, rows.z_axis, rows.w_axis];
+        // All four; the next overwrite those too many.
+        self.gathered[self.length..self.length + 4].copy_from_slice(&rows);
+        self.length += count;
+        if self.length > GATHERED {
+            self.flush();
+        }
+    }
+
+    /// Takes the curvature of a point, unless it was not asked for.
+    ///
+    /// # Safety
+    /// At most once for each point.
+    #[inline(always)]
+    pub unsafe fn write_curvature(&self, point: u32, curvature: f32) {
+        if let Some(all) = &self.normals.curvature {
+            // SAFETY: by the caller's promise.
+            unsafe { all.write(point as usize, curvature) };
+        }
+    }
+
+    /// Writes what was gathered.
+    #[inline(never)]
+    fn flush(&mut self) {
+        for row in bytemuck::cast_slice::<Vec4, [f32; 4]>(&self.gathered[..self.length]) {
+            let [x, y, z, point] = *row;
+            // SAFETY: by the promise of who called `write_lanes`.
+            unsafe { self.normals.normals.write(point.to_bits() as usize, Vec3::new(x, y, z)) };
+        }
+        self.length = 0;
+    }
+}
+
+impl Drop for Writer<'_> {
+    fn drop(&mut self) {
+        self.flush();
     }
 }
 

@@ -8,7 +8,7 @@ use super::matrix::{dot_lanes, times_lanes, transposed};
 use crate::error::Error;
 use crate::grid::Placed;
 use crate::lattice::cube_centre;
-use crate::normals::Normals;
+use crate::normals::{Normals, Writer};
 use crate::parallel::Filling;
 use crate::progress::Stage;
 use glam::{Vec3, Vec4};
@@ -67,6 +67,7 @@ impl Vote<'_> {
 struct Task<'a> {
     vote: &'a Vote<'a>,
     counts: &'a [AtomicU64; SIZES],
+    writer: Writer<'a>,
     around: Around,
     near: Vec<(Vec3, usize)>,
     ballot: Ballot,
@@ -75,14 +76,15 @@ struct Task<'a> {
 
 impl<'a> Task<'a> {
     fn new(vote: &'a Vote<'a>, counts: &'a [AtomicU64; SIZES]) -> Self {
-        Self { vote, counts, around: Around::new(), near: Vec::new(), ballot: Ballot::default(), resolved: 0 }
+        let writer = vote.normals.writer();
+        Self { vote, counts, writer, around: Around::new(), near: Vec::new(), ballot: Ballot::default(), resolved: 0 }
     }
 
     /// Finds the normals of the points of a cube, unless it is to be divided: answers whether it was settled.
     #[optimize(size)]
     #[inline(never)]
     fn settle(&mut self, brick: usize, cube: usize, bit: u32) -> bool {
-        let Vote { level, chosen, is_last, normals } = *self.vote;
+        let Vote { level, chosen, is_last, .. } = *self.vote;
         let (own, surface) = (&chosen[cube], &level.surfaces[cube]);
         let can_divide = !is_last && surface.points >= DIVIDED_POINTS;
         let mut smooth = None;
@@ -106,12 +108,12 @@ impl<'a> Task<'a> {
                 None => self.ballot.normals(four, cube_centre(bit)),
             };
             // SAFETY: every point of the input stands in one cube that is wanted and not divided.
-            unsafe { normals.write_lanes(four.iter().map(|p| level.name(p)), found) };
+            unsafe { self.writer.write_lanes(four.iter().map(|p| level.name(p)), found) };
         }
-        if normals.has_curvature() {
+        if self.writer.has_curvature() {
             for p in placed {
                 // SAFETY: as above.
-                unsafe { normals.write_curvature(level.name(p), own.variation) };
+                unsafe { self.writer.write_curvature(level.name(p), own.variation) };
             }
         }
         let count = placed.len() as u64;

@@ -54,7 +54,7 @@ pub(crate) fn normals(
     let normals = Normals::new(count, tree.places.len(), curvature)?;
     let size = (NEIGHBOURS / k.max(1)).clamp(16, 1024);
     stage.run(tree.places.len().div_ceil(size), &|task| {
-        let mut search = Search::new(tree, k);
+        let (mut search, mut writer) = (Search::new(tree, k), normals.writer());
         let mut edges = Vec::new();
         let mut resolved = 0;
         for place in parallel::piece(tree.places.len(), size, task) {
@@ -66,7 +66,7 @@ pub(crate) fn normals(
             resolved += u64::from(plane.is_some());
             let (normal, variation) = plane.map_or((Vec3::ZERO, 0.0), |plane| (plane.normal, plane.variation));
             // SAFETY: a point stands in the tree once.
-            unsafe { normals.write(tree.places[place].point, normal, variation) };
+            unsafe { writer.write(tree.places[place].point, normal, variation) };
         }
         normals.add_resolved(resolved);
     })?;
