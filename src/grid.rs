@@ -22,6 +22,12 @@ pub(crate) struct Placed {
 }
 
 impl Placed {
+    /// Put together as four lanes of floats, which are stored as one; four numbers would be stored one by one.
+    #[inline(always)]
+    pub fn new(local: Vec3, point: u32) -> Self {
+        bytemuck::cast(local.extend(f32::from_bits(point)))
+    }
+
     /// The place, as the first three of four lanes.
     #[inline(always)]
     pub fn lanes(self) -> Vec4 {
@@ -234,7 +240,7 @@ fn sort_by_brick(
                 let (_, local) = lattice.place(points.positions[point]);
                 // SAFETY: `next` runs through the part of this piece and this brick, which the sums above gave to no
                 // other piece and no other brick.
-                unsafe { placed.write(*next as usize, Placed { local, point: point as u32 }) };
+                unsafe { placed.write(*next as usize, Placed::new(local, point as u32)) };
                 *next += 1;
             }
         }
