@@ -97,8 +97,12 @@ function shortenNames(glue, folder) {
 const letters = (number) =>
   [...number.toString(26)].map((digit) => String.fromCharCode(97 + parseInt(digit, 26))).join('');
 
-/** A wasm module with other names of its imports and exports (https://webassembly.github.io/spec/core/binary/modules.html). */
+/**
+ * A wasm module with other names of its imports and exports, and without what only tools read: which tools made it, and
+ * which features it needs (https://webassembly.github.io/spec/core/binary/modules.html).
+ */
 function withNames(module, rename) {
+  const CUSTOM = 0;
   const IMPORTS = 2;
   const EXPORTS = 7;
   let at = 8;
@@ -150,7 +154,7 @@ function withNames(module, rename) {
       body = Buffer.concat([encoded(count), ...entries.flat()]);
     }
     at = start + length;
-    pieces.push(Buffer.from([id]), encoded(body.length), body);
+    if (id !== CUSTOM) pieces.push(Buffer.from([id]), encoded(body.length), body);
   }
   return Buffer.concat(pieces);
 }

@@ -163,6 +163,7 @@ impl<'a> Header<'a> {
     }
 
     /// The index of the element named `vertex`.
+    #[optimize(size)]
     pub fn vertex(&self) -> Result<usize, Error> {
         let found = self.elements.iter().position(|element| element.name == b"vertex");
         found.ok_or_else(|| Error::format(None, format_args!("no element vertex; it has {}", self.describe())))
@@ -170,6 +171,7 @@ impl<'a> Header<'a> {
 
     /// Why there are no points in element `vertex`, which lacks a coordinate.
     #[cold]
+    #[optimize(size)]
     pub fn without_position(&self, vertex: &Element) -> Error {
         if vertex.properties.iter().any(|property| property.name == b"packed_position") {
             return Error::format(
@@ -184,6 +186,7 @@ impl<'a> Header<'a> {
     }
 
     /// The texts of all comments and `obj_info` lines.
+    #[optimize(size)]
     pub fn comments(&self) -> Vec<String> {
         let mut comments = Vec::new();
         for line in self.lines.iter().filter(|line| line.kind == LineKind::Comment) {
@@ -196,6 +199,7 @@ impl<'a> Header<'a> {
 
     /// `vertex 12: float x, float y; face 4: list uchar int z`.
     #[cold]
+    #[optimize(size)]
     fn describe(&self) -> String {
         const SHOWN: usize = 600;
         let mut text = Vec::new();
@@ -227,6 +231,7 @@ fn mistake(line: u64, text: &[u8], wanted: &str) -> Error {
     Error::format(Some(Place::Line(line)), format_args!("'{}'; wanted {wanted}", quote(text, 80)))
 }
 
+#[optimize(size)]
 fn parse_format(text: &[u8], mut words: &[u8], line: u64) -> Result<Format, Error> {
     let name = word(&mut words);
     let format = [Format::Ascii, Format::BinaryLittleEndian, Format::BinaryBigEndian]
@@ -246,6 +251,7 @@ fn parse_element<'a>(text: &[u8], mut words: &'a [u8], line: u64) -> Result<Elem
     }
 }
 
+#[optimize(size)]
 fn parse_property<'a>(text: &[u8], mut words: &'a [u8], line: u64) -> Result<Property<'a>, Error> {
     let scalar = |words: &mut &[u8]| Scalar::from_name(word(words)).ok_or_else(|| mistake(line, text, scalar::WANTED));
     let mut rest = words;
@@ -283,6 +289,7 @@ struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
+    #[optimize(size)]
     fn next(&mut self) -> Option<&'a [u8]> {
         let rest = self.file.get(self.at..).filter(|rest| !rest.is_empty())?;
         // Looking no further than a header can reach keeps this cheap on a large body without line ends.
@@ -306,6 +313,7 @@ fn line_end(file: &[u8], start: usize) -> u8 {
 
 /// What a file without the first line `ply` is, where that can be told.
 #[cold]
+#[optimize(size)]
 fn foreign(file: &[u8]) -> Error {
     const UNPACK: &str = "; unpack it first";
     const UTF_16: (&str, &str) = ("text in UTF-16", "; save it as plain ASCII or UTF-8");
@@ -348,6 +356,7 @@ pub(super) fn shorten(bytes: &[u8]) -> String {
 /// Bytes of a file for an error text, at most so many.
 #[cold]
 #[inline(never)]
+#[optimize(size)]
 fn quote(bytes: &[u8], most: usize) -> String {
     let mut shown = bytes[..bytes.len().min(most)].to_vec();
     for byte in &mut shown {
