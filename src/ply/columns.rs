@@ -20,6 +20,14 @@ pub(super) struct Column {
     pub component: usize,
 }
 
+impl Column {
+    /// Whether another one of the same type comes next, in binary rows as in the array.
+    pub fn is_before(&self, other: &Self) -> bool {
+        (other.target, other.component) == (self.target, self.component + 1)
+            && (other.scalar, other.offset) == (self.scalar, self.offset + self.scalar.size())
+    }
+}
+
 /// The array a property goes to.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Target {
@@ -165,11 +173,11 @@ pub(super) struct Places<'a> {
 }
 
 impl Places<'_> {
-    fn floats(&self, column: &Column) -> (&Scatter<'_, f32>, usize, f64) {
+    fn floats(&self, column: &Column) -> (&Scatter<'_, f32>, usize, DVec3) {
         match column.target {
-            Positions => (&self.floats[0], 3, self.origin[column.component]),
-            Normals => (&self.floats[1], 3, 0.0),
-            Intensity | Colors => (&self.floats[2], 1, 0.0),
+            Positions => (&self.floats[0], 3, self.origin),
+            Normals => (&self.floats[1], 3, DVec3::ZERO),
+            Intensity | Colors => (&self.floats[2], 1, DVec3::ZERO),
         }
     }
 
@@ -190,66 +198,94 @@ impl Places<'_> {
         let place = width * point + column.component;
         // SAFETY: the caller's promise.
         let place = unsafe { floats.slice(place..place + 1) };
-        place[0] = relative(value, origin);
+        place[0] = relative(value, origin[column.component]);
     }
 
-    /// Reads one column of binary rows of `stride` bytes each to the points from `first` on.
+    /// Reads columns of one type that lie side by side in binary rows, to the points from `first` on.
     ///
     /// # Safety
     /// As for `store`, for all these points.
-    pub unsafe fn store_column(&self, first: usize, rows: &[u8], stride: usize, column: &Column, big_endian: bool) {
-        let source = Source { rows, stride, offset: column.offset, big_endian };
-        let end = first + rows.len() / stride;
-        if column.target == Colors && column.scalar == Scalar::U8 {
+    pub unsafe fn store_columns(&self, first: usize, rows: Rows, columns: &[Column], big_endian: bool) {
+        let (floats, width, origin) = self.floats(&columns[0]);
+        let Column { scalar, target, component, offset, .. } = columns[0];
+        let of = |width: usize| width * first..width * (first + rows.bytes.len() / rows.stride);
+        let is_foreign = big_endian != cfg!(target_endian = "big");
+        // What stands in the file as the array has it is copied.
+        let places = match (target, scalar) {
             // SAFETY: the caller's promise.
-            let places = unsafe { self.colors.slice(4 * first..4 * end) };
-            return source.each(places, 4, column.component, |[value]| value);
-        }
-        let (floats, width, origin) = self.floats(column);
-        if column.target == Colors || !matches!(column.scalar, Scalar::F32 | Scalar::F64) {
-            for (row, point) in rows.chunks_exact(stride).zip(first..) {
-                let value = &row[column.offset..column.offset + column.scalar.size()];
+            (Colors, Scalar::U8) => Some(unsafe { self.colors.slice(of(4)) }),
+            (Positions | Normals | Intensity, Scalar::F32) if !is_foreign && origin == DVec3::ZERO => {
                 // SAFETY: the caller's promise.
-                unsafe { self.store(point, column, column.scalar.to_f64(bits(value, big_endian))) };
+                Some(bytemuck::cast_slice_mut(unsafe { floats.slice(of(width)) }))
             }
-            return;
+            _ => None,
+        };
+        if let Some(places) = places {
+            let size = scalar.size();
+            return rows.copy(offset, size * columns.len(), places, 4 * width, size * component);
         }
-        // SAFETY: the caller's promise.
-        let places = unsafe { floats.slice(width * first..width * end) };
-        if column.scalar == Scalar::F64 {
-            source.each(places, width, column.component, |b| relative(f64::from_le_bytes(b), origin));
-        } else {
-            // Exact where the origin is zero.
-            source.each(places, width, column.component, |b| relative(f64::from(f32::from_le_bytes(b)), origin));
+        for column in columns {
+            if target == Colors || !matches!(scalar, Scalar::F32 | Scalar::F64) {
+                for (row, point) in rows.bytes.chunks_exact(rows.stride).zip(first..) {
+                    let value = &row[column.offset..column.offset + scalar.size()];
+                    // SAFETY: the caller's promise.
+                    unsafe { self.store(point, column, scalar.to_f64(bits(value, big_endian))) };
+                }
+                continue;
+            }
+            // SAFETY: the caller's promise.
+            let places = unsafe { floats.slice(of(width)) }.chunks_exact_mut(width);
+            let places = places.map(|place| &mut place[column.component]);
+            let origin = origin[column.component];
+            if scalar == Scalar::F64 {
+                rows.convert(column, big_endian, places, |b| relative(f64::from_le_bytes(b), origin));
+            } else {
+                // Exact where the origin is zero.
+                rows.convert(column, big_endian, places, |b| relative(f64::from(f32::from_le_bytes(b)), origin));
+            }
         }
     }
 }
 
-/// One column of binary rows.
-struct Source<'a> {
-    rows: &'a [u8],
-    stride: usize,
-    offset: usize,
-    big_endian: bool,
+/// Binary rows of `stride` bytes each.
+#[derive(Clone, Copy)]
+pub(super) struct Rows<'a> {
+    pub bytes: &'a [u8],
+    pub stride: usize,
 }
 
-impl Source<'_> {
-    /// Converts the `N` bytes of each row, in little-endian order, into one component of `places`.
+impl Rows<'_> {
+    /// Copies some bytes of each row, from `offset` on, into the places of `width` bytes each, from `at` on.
+    #[inline(never)]
+    fn copy(self, offset: usize, length: usize, places: &mut [u8], width: usize, at: usize) {
+        for (row, place) in self.bytes.chunks_exact(self.stride).zip(places.chunks_exact_mut(width)) {
+            let (from, to) = (&row[offset..], &mut place[at..]);
+            // With a length that the compiler knows a copy is one or two instructions.
+            match length {
+                12 => to[..12].copy_from_slice(&from[..12]),
+                4 => to[..4].copy_from_slice(&from[..4]),
+                3 => to[..3].copy_from_slice(&from[..3]),
+                _ => to.iter_mut().zip(from).take(length).for_each(|(to, from)| *to = *from),
+            }
+        }
+    }
+
+    /// Converts a column of values of `N` bytes, which are handed over in little-endian order.
     #[inline]
-    fn each<const N: usize, T>(
-        &self,
-        places: &mut [T],
-        width: usize,
-        component: usize,
-        convert: impl Fn([u8; N]) -> T,
+    fn convert<'b, const N: usize>(
+        self,
+        column: &Column,
+        big_endian: bool,
+        places: impl Iterator<Item = &'b mut f32>,
+        convert: impl Fn([u8; N]) -> f32,
     ) {
-        for (row, places) in self.rows.chunks_exact(self.stride).zip(places.chunks_exact_mut(width)) {
-            if let Some(bytes) = row[self.offset..].first_chunk::<N>() {
+        for (row, place) in self.bytes.chunks_exact(self.stride).zip(places) {
+            if let Some(bytes) = row[column.offset..].first_chunk::<N>() {
                 let mut bytes = *bytes;
-                if self.big_endian {
+                if big_endian {
                     bytes.reverse();
                 }
-                places[component] = convert(bytes);
+                *place = convert(bytes);
             }
         }
     }

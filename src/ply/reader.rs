@@ -1,7 +1,7 @@
 //! File bytes to a cloud.
 
 use super::body::{Body, Part};
-use super::columns::{self, Arrays, Column, Places, Target};
+use super::columns::{self, Arrays, Column, Places, Rows, Target};
 use super::header::{Element, Header, decode};
 use super::scalar::bits;
 use super::{PointCloud, ReadOptions, tasks};
@@ -116,10 +116,10 @@ impl Reader<'_> {
         let mut first = 0;
         while first < part.count {
             let end = part.count.min(first + BLOCK);
-            for column in self.columns {
-                let rows = &rows[first * stride..end * stride];
+            for columns in self.columns.chunk_by(Column::is_before) {
+                let rows = Rows { bytes: &rows[first * stride..end * stride], stride };
                 // SAFETY: parts share no point.
-                unsafe { places.store_column(part.first + first, rows, stride, column, big_endian) };
+                unsafe { places.store_columns(part.first + first, rows, columns, big_endian) };
             }
             first = end;
         }
