@@ -3,9 +3,9 @@
 use super::header::{Element, Kind, shorten};
 use super::scalar::{Scalar, bits};
 use crate::error::Error;
-use crate::parallel::Scatter;
-use crate::points::reserve;
+use crate::parallel::Filling;
 use glam::DVec3;
+use std::mem::MaybeUninit;
 
 /// One property that is read.
 #[derive(Clone, Copy)]
@@ -117,67 +117,46 @@ pub(super) fn is_wide(columns: &[Column]) -> bool {
     columns.iter().any(|column| column.target == Positions && column.scalar.is_wide())
 }
 
-/// The arrays of a cloud; those without a column stay empty.
+/// The arrays of a cloud, filled by tasks, each of which has its own points; those without a column stay empty.
 pub(super) struct Arrays {
-    pub positions: Vec<f32>,
-    pub normals: Vec<f32>,
-    pub colors: Vec<u8>,
-    pub intensity: Vec<f32>,
+    positions: Filling<f32>,
+    normals: Filling<f32>,
+    colors: Filling<u8>,
+    intensity: Filling<f32>,
+    /// What the positions are seen from.
+    origin: DVec3,
 }
 
 impl Arrays {
     /// Takes memory for `count` points.
     #[optimize(size)]
-    pub fn new(columns: &[Column], count: usize) -> Result<Self, Error> {
-        let floats = |target, width: usize| {
-            let mut items = Vec::new();
-            if has(columns, target) {
-                reserve(&mut items, width * count, "the cloud")?;
-                items.resize(width * count, 0.0);
-            }
-            Ok::<Vec<f32>, Error>(items)
-        };
-        let mut colors = Vec::new();
-        if has(columns, Colors) {
-            reserve(&mut colors, 4 * count, "the cloud")?;
-            // Opaque where the file has no alpha.
-            colors.resize(4 * count, 255);
-        }
-        Ok(Self {
-            positions: floats(Positions, 3)?,
-            normals: floats(Normals, 3)?,
-            colors,
-            intensity: floats(Intensity, 1)?,
-        })
+    pub fn new(columns: &[Column], count: usize, origin: DVec3) -> Result<Self, Error> {
+        let length = |target, width: usize| if has(columns, target) { width * count } else { 0 };
+        let floats = |target, width| Filling::new(length(target, width), "the cloud");
+        let colors = Filling::new(length(Colors, 4), "the cloud")?;
+        // SAFETY: nothing else writes yet.
+        let all = unsafe { colors.slice(0..length(Colors, 4)) };
+        // Opaque where the file has no alpha.
+        all.fill(MaybeUninit::new(255));
+        let (positions, normals) = (floats(Positions, 3)?, floats(Normals, 3)?);
+        Ok(Self { positions, normals, colors, intensity: floats(Intensity, 1)?, origin })
     }
 
-    /// To be filled by tasks, seen from an origin.
-    pub fn places(&mut self, origin: DVec3) -> Places<'_> {
-        Places {
-            floats: [
-                Scatter::new(&mut self.positions),
-                Scatter::new(&mut self.normals),
-                Scatter::new(&mut self.intensity),
-            ],
-            colors: Scatter::new(&mut self.colors),
-            origin,
-        }
+    /// Positions, normals, colours and intensity.
+    ///
+    /// # Safety
+    /// Every column must have been stored for every point.
+    pub unsafe fn complete(self) -> (Vec<f32>, Vec<f32>, Vec<u8>, Vec<f32>) {
+        let Self { positions, normals, colors, intensity, .. } = self;
+        // SAFETY: by the caller's promise; colours had a value before.
+        unsafe { (positions.complete(), normals.complete(), colors.complete(), intensity.complete()) }
     }
-}
 
-/// The arrays, each point of which one task writes.
-pub(super) struct Places<'a> {
-    floats: [Scatter<'a, f32>; 3],
-    colors: Scatter<'a, u8>,
-    origin: DVec3,
-}
-
-impl Places<'_> {
-    fn floats(&self, column: &Column) -> (&Scatter<'_, f32>, usize, DVec3) {
+    fn floats(&self, column: &Column) -> (&Filling<f32>, usize, DVec3) {
         match column.target {
-            Positions => (&self.floats[0], 3, self.origin),
-            Normals => (&self.floats[1], 3, DVec3::ZERO),
-            Intensity | Colors => (&self.floats[2], 1, DVec3::ZERO),
+            Positions => (&self.positions, 3, self.origin),
+            Normals => (&self.normals, 3, DVec3::ZERO),
+            Intensity | Colors => (&self.intensity, 1, DVec3::ZERO),
         }
     }
 
@@ -188,17 +167,13 @@ impl Places<'_> {
     #[inline]
     pub unsafe fn store(&self, point: usize, column: &Column, value: f64) {
         if column.target == Colors {
-            let place = 4 * point + column.component;
             // SAFETY: the caller's promise.
-            let place = unsafe { self.colors.slice(place..place + 1) };
-            place[0] = color(value, column.scalar);
+            unsafe { self.colors.write(4 * point + column.component, color(value, column.scalar)) };
             return;
         }
         let (floats, width, origin) = self.floats(column);
-        let place = width * point + column.component;
         // SAFETY: the caller's promise.
-        let place = unsafe { floats.slice(place..place + 1) };
-        place[0] = relative(value, origin[column.component]);
+        unsafe { floats.write(width * point + column.component, relative(value, origin[column.component])) };
     }
 
     /// Reads columns of one type that lie side by side in binary rows, to the points from `first` on.
@@ -216,7 +191,7 @@ impl Places<'_> {
             (Colors, Scalar::U8) => Some(unsafe { self.colors.slice(of(4)) }),
             (Positions | Normals | Intensity, Scalar::F32) if !is_foreign && origin == DVec3::ZERO => {
                 // SAFETY: the caller's promise.
-                Some(bytemuck::cast_slice_mut(unsafe { floats.slice(of(width)) }))
+                Some(bytes_of(unsafe { floats.slice(of(width)) }))
             }
             _ => None,
         };
@@ -257,15 +232,15 @@ pub(super) struct Rows<'a> {
 impl Rows<'_> {
     /// Copies some bytes of each row, from `offset` on, into the places of `width` bytes each, from `at` on.
     #[inline(never)]
-    fn copy(self, offset: usize, length: usize, places: &mut [u8], width: usize, at: usize) {
+    fn copy(self, offset: usize, length: usize, places: &mut [MaybeUninit<u8>], width: usize, at: usize) {
         for (row, place) in self.bytes.chunks_exact(self.stride).zip(places.chunks_exact_mut(width)) {
             let (from, to) = (&row[offset..], &mut place[at..]);
             // With a length that the compiler knows a copy is one or two instructions.
             match length {
-                12 => to[..12].copy_from_slice(&from[..12]),
-                4 => to[..4].copy_from_slice(&from[..4]),
-                3 => to[..3].copy_from_slice(&from[..3]),
-                _ => to.iter_mut().zip(from).take(length).for_each(|(to, from)| *to = *from),
+                12 => _ = to[..12].write_copy_of_slice(&from[..12]),
+                4 => _ = to[..4].write_copy_of_slice(&from[..4]),
+                3 => _ = to[..3].write_copy_of_slice(&from[..3]),
+                _ => to.iter_mut().zip(from).take(length).for_each(|(to, from)| _ = to.write(*from)),
             }
         }
     }
@@ -276,7 +251,7 @@ impl Rows<'_> {
         self,
         column: &Column,
         big_endian: bool,
-        places: impl Iterator<Item = &'b mut f32>,
+        places: impl Iterator<Item = &'b mut MaybeUninit<f32>>,
         convert: impl Fn([u8; N]) -> f32,
     ) {
         for (row, place) in self.bytes.chunks_exact(self.stride).zip(places) {
@@ -285,10 +260,16 @@ impl Rows<'_> {
                 if big_endian {
                     bytes.reverse();
                 }
-                *place = convert(bytes);
+                place.write(convert(bytes));
             }
         }
     }
+}
+
+/// The bytes of numbers that are not there yet.
+fn bytes_of(places: &mut [MaybeUninit<f32>]) -> &mut [MaybeUninit<u8>] {
+    // SAFETY: the same memory, and nothing is said about what it holds.
+    unsafe { std::slice::from_raw_parts_mut(places.as_mut_ptr().cast(), size_of_val(places)) }
 }
 
 /// The coordinate seen from the origin. What is finite stays finite: beyond the range of single precision it becomes

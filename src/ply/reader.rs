@@ -1,7 +1,7 @@
 //! File bytes to a cloud.
 
 use super::body::{Body, Part};
-use super::columns::{self, Arrays, Column, Places, Rows, Target};
+use super::columns::{self, Arrays, Column, Rows, Target};
 use super::header::{Element, Header, decode};
 use super::scalar::bits;
 use super::{PointCloud, ReadOptions, tasks};
@@ -58,20 +58,20 @@ pub fn read(file: &[u8], options: &ReadOptions, progress: &Progress) -> Result<P
             None => reader.origin_of_any(),
         };
     }
-    let mut arrays = Arrays::new(&columns, reader.count)?;
-    let places = arrays.places(origin);
+    let arrays = Arrays::new(&columns, reader.count, origin)?;
     tasks::run(&progress.stage("read", 0.0..1.0), parts.len(), &|i| match stride {
         Some(stride) => {
-            reader.read_fixed(&parts[i], stride, big_endian, &places);
+            reader.read_fixed(&parts[i], stride, big_endian, &arrays);
             Ok(())
         }
         None => reader.walk(&parts[i], 1, &mut |point, column, value| {
             // SAFETY: parts share no point.
-            unsafe { places.store(point, column, value) };
+            unsafe { arrays.store(point, column, value) };
         }),
     })?;
     progress.update("read", 1.0)?;
-    let Arrays { positions, normals, colors, intensity } = arrays;
+    // SAFETY: the parts hold all points, and what lacks a value was refused.
+    let (positions, normals, colors, intensity) = unsafe { arrays.complete() };
     Ok(PointCloud {
         positions,
         origin: origin.to_array(),
@@ -111,7 +111,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     /// Binary rows of one length: columns, block by block.
-    fn read_fixed(&self, part: &Part, stride: usize, big_endian: bool, places: &Places) {
+    fn read_fixed(&self, part: &Part, stride: usize, big_endian: bool, arrays: &Arrays) {
         let rows = part.rows(stride);
         let mut first = 0;
         while first < part.count {
@@ -119,7 +119,7 @@ impl Reader<'_> {
             for columns in self.columns.chunk_by(Column::is_before) {
                 let rows = Rows { bytes: &rows[first * stride..end * stride], stride };
                 // SAFETY: parts share no point.
-                unsafe { places.store_columns(part.first + first, rows, columns, big_endian) };
+                unsafe { arrays.store_columns(part.first + first, rows, columns, big_endian) };
             }
             first = end;
         }
