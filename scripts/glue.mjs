@@ -81,7 +81,7 @@ function shortenNames(glue, folder) {
   };
   for (const file of readdirSync(folder).filter((file) => file.endsWith('.wasm'))) {
     const path = join(folder, file);
-    writeFileSync(path, withNames(readFileSync(path), short));
+    writeFileSync(path, shortened(readFileSync(path), short));
   }
   const known = (name) => {
     if (!shorts.has(name)) throw new Failure(`no module in ${folder} has ${name}, which the glue uses`);
@@ -98,10 +98,10 @@ const letters = (number) =>
   [...number.toString(26)].map((digit) => String.fromCharCode(97 + parseInt(digit, 26))).join('');
 
 /**
- * A wasm module with other names of its imports and exports, and without what only tools read: which tools made it, and
- * which features it needs (https://webassembly.github.io/spec/core/binary/modules.html).
+ * A wasm module with other names of its imports and exports, and without custom sections, which only tools read: who made
+ * it, which features it needs (https://webassembly.github.io/spec/core/binary/modules.html).
  */
-function withNames(module, rename) {
+function shortened(module, rename) {
   const CUSTOM = 0;
   const IMPORTS = 2;
   const EXPORTS = 7;

@@ -211,7 +211,7 @@ impl<'a> Cube<'a> {
     /// Writes the normals of the points of the cube, and their curvature if it was asked for. Those of an octant, which lie
     /// one after the other, share its nodes; four at a time are computed at once.
     #[inline(always)]
-    fn interpolate(&self, points: &[Placed], normals: &mut Writer, tally: &mut Tally) {
+    fn interpolate(&self, points: &[Placed], writer: &mut Writer, tally: &mut Tally) {
         for (number, points) in octants(points, self.centre) {
             let Some(octant) = self.octant(number) else {
                 tally.used[0] += points.len() as u64;
@@ -220,21 +220,21 @@ impl<'a> Cube<'a> {
                     let normal = node.xyz();
                     tally.resolved += u64::from(normal != Vec3::ZERO);
                     // SAFETY: every point of the input stands in the grid once at the most.
-                    unsafe { normals.write(placed.point, normal, node.w) };
+                    unsafe { writer.write(placed.point, normal, node.w) };
                 }
                 continue;
             };
             tally.used[octant.used] += points.len() as u64;
             tally.resolved += points.len() as u64;
             let [_, u, v] = self.turn.axes;
-            if normals.has_curvature() {
+            if writer.has_curvature() {
                 // SAFETY: as above.
-                unsafe { octant.write_variations(points, u, v, normals) };
+                unsafe { octant.write_variations(points, u, v, writer) };
             }
             for four in points.chunks(4) {
                 let lanes = octant.normals(along(four, u), along(four, v), self.own);
                 // SAFETY: as above.
-                unsafe { normals.write_lanes(four.iter().map(|placed| placed.point), lanes) };
+                unsafe { writer.write_lanes(four.iter().map(|placed| placed.point), lanes) };
             }
         }
     }
@@ -360,12 +360,12 @@ impl Octant {
     // Apart from the normals: beside their loop it cost those who do not ask for it 10 % of the interpolation (wasm). One by
     // one: four at a time are no faster.
     #[inline(never)]
-    unsafe fn write_variations(self, points: &[Placed], u: usize, v: usize, normals: &Writer) {
+    unsafe fn write_variations(self, points: &[Placed], u: usize, v: usize, writer: &Writer) {
         for point in points {
             let place: &[f32; 3] = point.local.as_ref();
             let variation = self.variations(Vec4::splat(place[u]), Vec4::splat(place[v])).x;
             // SAFETY: by the caller's promise.
-            unsafe { normals.write_curvature(point.point, variation) };
+            unsafe { writer.write_curvature(point.point, variation) };
         }
     }
 

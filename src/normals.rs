@@ -43,7 +43,7 @@ impl Normals {
         Ok(Self { normals, curvature, resolved: AtomicU64::new(0) })
     }
 
-    /// For a task, which hands its normals over by it.
+    /// What one task hands its normals over with; all are written when it is dropped.
     pub fn writer(&self) -> Writer<'_> {
         Writer { normals: self, gathered: [Vec4::ZERO; GATHERED + 4], length: 0 }
     }
@@ -56,7 +56,7 @@ impl Normals {
     /// All that was taken.
     ///
     /// # Safety
-    /// As many points must have been written as [`Normals::new`] was told.
+    /// As many points must have been taken as [`Normals::new`] was told, and every [`Writer`] dropped.
     pub unsafe fn complete(self) -> Found {
         // SAFETY: all points were written, by the caller's promise, or zeroed before.
         let (normals, curvature) =
@@ -66,7 +66,7 @@ impl Normals {
     }
 }
 
-/// How many normals are gathered before they are written: as many as the nearest cache holds without noticing.
+/// When more normals than these are gathered, they are written: with four more they take 4 KiB.
 const GATHERED: usize = 252;
 
 /// Takes the normals of a task. They go to places all over the memory, and every place has to be waited for; of those
@@ -97,10 +97,10 @@ impl Writer<'_> {
         }
     }
 
-    /// Takes the normals of up to four points, lane by lane, of either sign.
+    /// Takes the normals of at most four points, lane by lane, of either sign.
     ///
     /// # Safety
-    /// At most once for each point.
+    /// At most once for each point, which is written later.
     #[inline(always)]
     pub unsafe fn write_lanes(&mut self, points: impl Iterator<Item = u32>, normals: [Vec4; 3]) {
         let [x, y, z] = face(normals);
@@ -135,12 +135,12 @@ impl Writer<'_> {
     /// Writes what was gathered.
     #[inline(never)]
     fn flush(&mut self) {
-        for row in bytemuck::cast_slice::<Vec4, [f32; 4]>(&self.gathered[..self.length]) {
+        let length = std::mem::take(&mut self.length);
+        for row in bytemuck::cast_slice::<Vec4, [f32; 4]>(&self.gathered[..length]) {
             let [x, y, z, point] = *row;
             // SAFETY: by the promise of who called `write_lanes`.
             unsafe { self.normals.normals.write(point.to_bits() as usize, Vec3::new(x, y, z)) };
         }
-        self.length = 0;
     }
 }
 

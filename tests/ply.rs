@@ -191,19 +191,23 @@ fn properties_may_stand_in_any_order() {
         ];
         order.iter().map(|i| all[*i]).collect()
     };
-    let value = |point: usize, property: usize| (16 * point + property) as u8;
-    let orders: [&[usize]; 6] = [
+    // Opaque where there is no alpha.
+    let value = |order: &[usize], point: usize, property: usize| {
+        if order.contains(&property) { (1 + 16 * point + property) as u8 } else { 255 }
+    };
+    let orders: [&[usize]; 7] = [
         &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11],
         &[2, 1, 0, 5, 4, 3, 9, 8, 7, 6, 10],
         &[0, 1, 11, 2, 3, 4, 10, 5, 7, 8, 6, 9],
         &[1, 2, 0, 4, 5, 3, 6, 7, 9, 8, 10],
         &[3, 4, 5, 0, 1, 2, 8, 9, 6, 7, 10],
         &[6, 7, 8, 9, 11, 10, 3, 4, 5, 0, 1, 2],
+        &[0, 1, 2, 6, 7, 8, 3, 4, 5, 10],
     ];
     for order in orders {
         let rows: Vec<Vec<V>> = (0..3)
             .map(|point| {
-                let of = |&i: &usize| match value(point, i) {
+                let of = |&i: &usize| match value(order, point, i) {
                     v if matches!(i, 6..=9 | 11) => U8(v),
                     v => F32(v.into()),
                 };
@@ -213,12 +217,12 @@ fn properties_may_stand_in_any_order() {
         for file in in_all_formats(&properties(order), &rows) {
             let cloud = read(file).unwrap();
             let floats = |of: std::ops::Range<usize>| -> Vec<f32> {
-                (0..3).flat_map(|point| of.clone().map(move |i| value(point, i).into())).collect()
+                (0..3).flat_map(|point| of.clone().map(move |i| value(order, point, i).into())).collect()
             };
             assert_eq!(cloud.positions, floats(0..3), "{order:?}");
             assert_eq!(cloud.normals.unwrap(), floats(3..6), "{order:?}");
             assert_eq!(cloud.intensity.unwrap(), floats(10..11), "{order:?}");
-            let colors: Vec<u8> = (0..3).flat_map(|point| (6..10).map(move |i| value(point, i))).collect();
+            let colors: Vec<u8> = (0..3).flat_map(|point| (6..10).map(move |i| value(order, point, i))).collect();
             assert_eq!(cloud.colors.unwrap(), colors, "{order:?}");
         }
     }

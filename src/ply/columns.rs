@@ -21,7 +21,7 @@ pub(super) struct Column {
 }
 
 impl Column {
-    /// Whether another one of the same type comes next, in binary rows as in the array.
+    /// Whether `other` has the same type and comes right after it, in binary rows as in the array.
     pub fn is_before(&self, other: &Self) -> bool {
         (other.target, other.component) == (self.target, self.component + 1)
             && (other.scalar, other.offset) == (self.scalar, self.offset + self.scalar.size())
@@ -128,27 +128,27 @@ pub(super) struct Arrays {
 }
 
 impl Arrays {
-    /// Takes memory for `count` points.
+    /// Takes memory for `count` points. The columns are those of [`find`]: of an array all components or none, but alpha.
     #[optimize(size)]
     pub fn new(columns: &[Column], count: usize, origin: DVec3) -> Result<Self, Error> {
         let length = |target, width: usize| if has(columns, target) { width * count } else { 0 };
         let floats = |target, width| Filling::new(length(target, width), "the cloud");
+        let (positions, normals, intensity) = (floats(Positions, 3)?, floats(Normals, 3)?, floats(Intensity, 1)?);
         let colors = Filling::new(length(Colors, 4), "the cloud")?;
         // SAFETY: nothing else writes yet.
         let all = unsafe { colors.slice(0..length(Colors, 4)) };
         // Opaque where the file has no alpha.
         all.fill(MaybeUninit::new(255));
-        let (positions, normals) = (floats(Positions, 3)?, floats(Normals, 3)?);
-        Ok(Self { positions, normals, colors, intensity: floats(Intensity, 1)?, origin })
+        Ok(Self { positions, normals, colors, intensity, origin })
     }
 
     /// Positions, normals, colours and intensity.
     ///
     /// # Safety
-    /// Every column must have been stored for every point.
+    /// Each of the columns that [`Arrays::new`] was told must have been stored for every point.
     pub unsafe fn complete(self) -> (Vec<f32>, Vec<f32>, Vec<u8>, Vec<f32>) {
         let Self { positions, normals, colors, intensity, .. } = self;
-        // SAFETY: by the caller's promise; colours had a value before.
+        // SAFETY: by the caller's promise, and because an array has all its columns or is empty; alpha had a value before.
         unsafe { (positions.complete(), normals.complete(), colors.complete(), intensity.complete()) }
     }
 
@@ -176,28 +176,28 @@ impl Arrays {
         unsafe { floats.write(width * point + column.component, relative(value, origin[column.component])) };
     }
 
-    /// Reads columns of one type that lie side by side in binary rows, to the points from `first` on.
+    /// Reads columns, at least one and each [before](Column::is_before) the next, to the points from `first` on.
     ///
     /// # Safety
     /// As for `store`, for all these points.
     pub unsafe fn store_columns(&self, first: usize, rows: Rows, columns: &[Column], big_endian: bool) {
         let (floats, width, origin) = self.floats(&columns[0]);
         let Column { scalar, target, component, offset, .. } = columns[0];
-        let of = |width: usize| width * first..width * (first + rows.bytes.len() / rows.stride);
+        let range = |width: usize| width * first..width * (first + rows.bytes.len() / rows.stride);
         let is_foreign = big_endian != cfg!(target_endian = "big");
         // What stands in the file as the array has it is copied.
         let places = match (target, scalar) {
             // SAFETY: the caller's promise.
-            (Colors, Scalar::U8) => Some(unsafe { self.colors.slice(of(4)) }),
+            (Colors, Scalar::U8) => Some((unsafe { self.colors.slice(range(4)) }, 4)),
             (Positions | Normals | Intensity, Scalar::F32) if !is_foreign && origin == DVec3::ZERO => {
                 // SAFETY: the caller's promise.
-                Some(bytes_of(unsafe { floats.slice(of(width)) }))
+                Some((bytes_of(unsafe { floats.slice(range(width)) }), 4 * width))
             }
             _ => None,
         };
-        if let Some(places) = places {
+        if let Some((places, width)) = places {
             let size = scalar.size();
-            return rows.copy(offset, size * columns.len(), places, 4 * width, size * component);
+            return rows.copy(offset, size * columns.len(), places, width, size * component);
         }
         for column in columns {
             if target == Colors || !matches!(scalar, Scalar::F32 | Scalar::F64) {
@@ -209,7 +209,7 @@ impl Arrays {
                 continue;
             }
             // SAFETY: the caller's promise.
-            let places = unsafe { floats.slice(of(width)) }.chunks_exact_mut(width);
+            let places = unsafe { floats.slice(range(width)) }.chunks_exact_mut(width);
             let places = places.map(|place| &mut place[column.component]);
             let origin = origin[column.component];
             if scalar == Scalar::F64 {
@@ -240,7 +240,7 @@ impl Rows<'_> {
                 12 => _ = to[..12].write_copy_of_slice(&from[..12]),
                 4 => _ = to[..4].write_copy_of_slice(&from[..4]),
                 3 => _ = to[..3].write_copy_of_slice(&from[..3]),
-                _ => to.iter_mut().zip(from).take(length).for_each(|(to, from)| _ = to.write(*from)),
+                _ => to[..length].iter_mut().zip(&from[..length]).for_each(|(to, from)| _ = to.write(*from)),
             }
         }
     }
@@ -255,6 +255,7 @@ impl Rows<'_> {
         convert: impl Fn([u8; N]) -> f32,
     ) {
         for (row, place) in self.bytes.chunks_exact(self.stride).zip(places) {
+            // Always so, for a column lies within its row; to panic if not makes the module half a KiB larger.
             if let Some(bytes) = row[column.offset..].first_chunk::<N>() {
                 let mut bytes = *bytes;
                 if big_endian {

@@ -70,7 +70,7 @@ pub fn read(file: &[u8], options: &ReadOptions, progress: &Progress) -> Result<P
         }),
     })?;
     progress.update("read", 1.0)?;
-    // SAFETY: the parts hold all points, and what lacks a value was refused.
+    // SAFETY: the parts hold all points, and a row that lacks a value was refused.
     let (positions, normals, colors, intensity) = unsafe { arrays.complete() };
     Ok(PointCloud {
         positions,
