@@ -47,13 +47,27 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Reads a file of the cloud.
+/// Reads a file of the cloud, in which normals are doubles and the points have colours.
 fn read(cloud: &[f32], ascii: bool, runs: usize) -> Result<(), Box<dyn Error>> {
-    let header = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {POINTS}\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
-    );
-    let body = cloud.iter().flat_map(|c| c.to_le_bytes());
-    let binary: Vec<u8> = header.bytes().chain(body).collect();
+    let properties = [
+        "float x",
+        "float y",
+        "float z",
+        "double nx",
+        "double ny",
+        "double nz",
+        "uchar red",
+        "uchar green",
+        "uchar blue",
+    ];
+    let properties: String = properties.map(|property| format!("property {property}\n")).concat();
+    let header = format!("ply\nformat binary_little_endian 1.0\nelement vertex {POINTS}\n{properties}end_header\n");
+    let mut binary = header.into_bytes();
+    for point in cloud.chunks(3) {
+        binary.extend(point.iter().flat_map(|c| c.to_le_bytes()));
+        binary.extend(point.iter().flat_map(|c| f64::from(*c).to_le_bytes()));
+        binary.extend(point.iter().map(|c| (100.0 + 80.0 * c) as u8));
+    }
     let file = ply::write(&binary, &ply::Additions::default(), ascii, &Progress::silent())?;
     for _ in 0..runs {
         black_box(ply::read(&file, &ply::ReadOptions::default(), &Progress::silent())?);
