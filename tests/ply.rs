@@ -845,15 +845,19 @@ fn a_line_feed_within_a_row_stays_a_blank() {
 fn many_rows_are_written_in_tasks() {
     let count = 150_000_usize;
     let number = |i: usize| i as f32 * 0.5;
-    let rows: Vec<Vec<V>> =
-        (0..count).map(|i| vec![V::F32(number(i)), V::F32(1.0), V::U8(i as u8), V::F32(2.0)]).collect();
+    let position = |i: usize| [number(i), -number(i), number(i) + 0.25];
+    let row = |i: usize| {
+        let [x, y, z] = position(i).map(V::F32);
+        vec![x, y, V::U8(i as u8), z]
+    };
+    let rows: Vec<Vec<V>> = (0..count).map(row).collect();
     let normals: Vec<f32> = (0..3 * count).map(|i| i as f32).collect();
     let files = in_all_formats(&["float x", "float y", "uchar tag", "float z"], &rows);
     let outputs = files.map(|file| write(file, &normals, false).unwrap());
     assert!(outputs[0] == outputs[1] && outputs[1] == outputs[2]);
     let cloud = read(&outputs[0]).unwrap();
     assert!(cloud.normals.as_deref() == Some(&normals[..]));
-    assert!((0..count).all(|i| cloud.positions[3 * i] == number(i)));
+    assert!(cloud.positions == (0..count).flat_map(position).collect::<Vec<f32>>());
 }
 
 #[test]
