@@ -72,7 +72,10 @@ export { init as default };
   return glue;
 }
 
-/** Gives the imports and exports of all modules in a folder short names, the same in each, and the glue with them. */
+/**
+ * Gives the imports and exports of all modules in a folder short names, the same in each, and the glue with them; what only
+ * tools read goes out of the modules on the way.
+ */
 function shortenNames(glue, folder) {
   const shorts = new Map();
   const short = (name) => {
