@@ -201,9 +201,14 @@ impl Window {
     fn sum_lanes<const N: usize>(&self, terms: impl Fn(usize) -> [Vec4; N]) -> [f64; N] {
         let mut sums = [Vec4::ZERO; N];
         for i in (0..self.count).step_by(4) {
-            for (sum, term) in sums.iter_mut().zip(terms(i)) {
-                *sum += term;
+            let terms = terms(i);
+            // In sevens: a longer loop stays a loop, with all terms in memory, and takes a sixth more time for a surface.
+            let (sums, last_sums) = sums.as_chunks_mut::<7>();
+            let (terms, last_terms) = terms.as_chunks::<7>();
+            for (sums, terms) in sums.iter_mut().zip(terms) {
+                (0..7).for_each(|i| sums[i] += terms[i]);
             }
+            last_sums.iter_mut().zip(last_terms).for_each(|(sum, term)| *sum += *term);
         }
         let mut totals = [0.0; N];
         for (totals, sums) in totals.chunks_mut(4).zip(sums.chunks(4)) {
