@@ -17,11 +17,15 @@ impl Surroundings {
         Self { occupied: Places::NONE, cubes: [0; Places::COUNT] }
     }
 
-    /// Looks up the 27 bricks around and in place of brick `brick`.
+    /// Looks up the cubes of brick `brick` and those beside them, in the 27 bricks around and in place of it.
     pub fn look(&mut self, grid: &Grid, brick: usize) {
         self.occupied = Places::NONE;
-        let place = grid.bricks.places[brick];
-        for Side { step, facing, shift } in &SIDES {
+        let (place, own) = (grid.bricks.places[brick], grid.masks[brick]);
+        for (Side { step, facing, shift }, opposite) in SIDES.iter().zip(SIDES.iter().rev()) {
+            // Only what lies beside cubes of the brick is asked for.
+            if own & opposite.facing == 0 {
+                continue;
+            }
             let Some(number) = grid.bricks.number(place + step) else { continue };
             for bit in set_bits(grid.masks[number as usize] & facing) {
                 let place = Places::of_cube(bit).wrapping_add_signed(*shift);
