@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::lattice::Lattice;
 use crate::parallel::{self, Filling, Gathering};
-use crate::points::{CHUNK, Points, fitted, reserve};
+use crate::points::{CHUNK, Points, reserve};
 use crate::progress::Stage;
 use glam::IVec3;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -95,12 +95,14 @@ impl Bricks {
         reserve(&mut bits, count, "the grid")?;
         bits.resize_with(count, AtomicU64::default);
         let keys = Filling::<u32>::new(points.len(), "the sorting keys")?;
+        let (first, strides) = (layout.first.as_dvec3(), layout.strides.as_dvec3());
         stage.run(points.chunks(), &|i| {
             for point in parallel::piece(points.len(), CHUNK, i) {
                 let mut key = OUTSIDE;
-                if let Some((brick, _)) = lattice.locate(points.positions[point]) {
-                    let slot = layout.slot(brick);
-                    key = slot as u32;
+                if let Some(brick) = lattice.brick(points.positions[point]) {
+                    // As [`Layout::slot`] has it.
+                    key = whole((brick - first).dot(strides));
+                    let slot = key as usize;
                     let (word, bit) = (&bits[slot / 64], 1 << (slot % 64));
                     // Reading first: most points find their bit set, and then no thread waits for another.
                     if word.load(Relaxed) & bit == 0 {
@@ -135,20 +137,24 @@ impl Bricks {
         // Sorted below, so the order in which the chunks come does not matter.
         let found = Gathering::new("the grid");
         stage.part(0.0..0.5).run(points.chunks(), &|i| {
-            let mut places: Vec<IVec3> = Vec::new();
+            let mut places = Vec::new();
             for &point in points.chunk(i) {
-                if let Some((brick, _)) = lattice.locate(point)
-                    && places.last() != Some(&brick)
-                {
-                    places.push(brick);
+                if let Some(brick) = lattice.brick_place(point) {
+                    // Of this width, so that there is one sort of such triples in the module.
+                    let place = [brick.z, brick.y, brick.x].map(i64::from);
+                    if places.last() != Some(&place) {
+                        places.push(place);
+                    }
                 }
             }
             sort(&mut places);
             found.append(places);
         })?;
-        let mut places = found.all()?;
-        sort(&mut places);
-        let places = fitted(&places, "the grid")?;
+        let mut found = found.all()?;
+        sort(&mut found);
+        let mut places = Vec::new();
+        reserve(&mut places, found.len(), "the grid")?;
+        places.extend(found.into_iter().map(|[z, y, x]| IVec3::new(x as i32, y as i32, z as i32)));
 
         let mut slots = Vec::new();
         let length = (2 * places.len()).next_power_of_two();
@@ -166,7 +172,7 @@ impl Bricks {
         let keys = Filling::new(points.len(), "the sorting keys")?;
         stage.part(0.5..1.0).run(points.chunks(), &|i| {
             for point in parallel::piece(points.len(), CHUNK, i) {
-                let number = lattice.locate(points.positions[point]).and_then(|(brick, _)| bricks.number(brick));
+                let number = lattice.brick_place(points.positions[point]).and_then(|brick| bricks.number(brick));
                 // SAFETY: each point belongs to one chunk.
                 unsafe { keys.write(point, number.unwrap_or(OUTSIDE)) };
             }
@@ -225,13 +231,20 @@ pub(crate) fn set_bits(mut bits: u64) -> impl Iterator<Item = u32> {
     })
 }
 
+/// A whole number from 0 to 2^32 - 1 as such: WebAssembly's own conversion looks at what else it might be.
+#[inline(always)]
+fn whole(number: f64) -> u32 {
+    const BIT: f64 = (1u64 << 52) as f64;
+    (number + BIT).to_bits() as u32
+}
+
 /// How many bricks come before a slot.
 fn rank(bits: &[u64], before: &[u32], slot: usize) -> u32 {
     before[slot / 64] + (bits[slot / 64] & ((1 << (slot % 64)) - 1)).count_ones()
 }
 
-fn sort(places: &mut Vec<IVec3>) {
-    places.sort_unstable_by_key(|p| (p.z, p.y, p.x));
+fn sort(places: &mut Vec<[i64; 3]>) {
+    places.sort_unstable();
     places.dedup();
 }
 

@@ -104,6 +104,9 @@ impl Density {
     }
 }
 
+/// Where a cube lies: whole numbers, as the bits of doubles. They are only compared, and integers would take longer.
+type Cube = [i64; 3];
+
 /// Cubes of one grid that hold a chosen point each, with the number of chosen points in them.
 struct Probes {
     origin: DVec3,
@@ -111,7 +114,7 @@ struct Probes {
     /// 1 / edge.
     scale: f64,
     /// Sorted by cube.
-    chosen: Vec<([i64; 3], u32)>,
+    chosen: Vec<(Cube, u32)>,
     /// A bit for each of 2^16 hashes of a cube: turns most points away at once.
     filter: Vec<u64>,
 }
@@ -132,7 +135,7 @@ impl Probes {
         for halvings in 0..64 {
             probes.edge = extent * exp2(-f64::from(halvings));
             probes.scale = 1.0 / probes.edge;
-            let mut cubes: Vec<[i64; 3]> = sample.iter().step_by(step).map(|p| probes.cube(*p).0).collect();
+            let mut cubes: Vec<Cube> = sample.iter().step_by(step).map(|p| probes.cube(*p).0).collect();
             cubes.sort_unstable();
             probes.chosen = cubes.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as u32)).collect();
             let is_inside = |point: &DVec3| probes.search(probes.cube(*point).0).is_some();
@@ -149,19 +152,20 @@ impl Probes {
     }
 
     /// The cube of a point, and where in the cube the point lies, in 0 to 1.
-    fn cube(&self, point: DVec3) -> ([i64; 3], DVec3) {
+    fn cube(&self, point: DVec3) -> (Cube, DVec3) {
         let place = (point - self.origin) * self.scale;
         let floor = place.floor();
-        (floor.as_i64vec3().to_array(), place - floor)
+        // Adding zero turns -0 into 0.
+        (floor.to_array().map(|number| (number + 0.0).to_bits() as i64), place - floor)
     }
 
     /// The number of the probe at a cube.
-    fn find(&self, cube: [i64; 3]) -> Option<u32> {
+    fn find(&self, cube: Cube) -> Option<u32> {
         let bit = hash(cube);
         if self.filter[bit / 64] >> (bit % 64) & 1 == 1 { self.search(cube) } else { None }
     }
 
-    fn search(&self, cube: [i64; 3]) -> Option<u32> {
+    fn search(&self, cube: Cube) -> Option<u32> {
         self.chosen.binary_search_by_key(&cube, |(cube, _)| *cube).ok().map(|probe| probe as u32)
     }
 
@@ -209,8 +213,10 @@ impl Probes {
     }
 }
 
-fn hash(cube: [i64; 3]) -> usize {
-    let [x, y, z] = cube.map(|c| c as u64);
+fn hash(cube: Cube) -> usize {
+    // After this addition whole numbers stand in the last bits.
+    const BIT: f64 = (3u64 << 51) as f64;
+    let [x, y, z] = cube.map(|c| (f64::from_bits(c as u64) + BIT).to_bits());
     let mixed = x.wrapping_mul(0x9E37_79B9_7F4A_7C15)
         ^ y.wrapping_mul(0xC2B2_AE3D_27D4_EB4F)
         ^ z.wrapping_mul(0x1656_67B1_9E37_79F9);

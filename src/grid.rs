@@ -237,7 +237,7 @@ fn sort_by_brick(
         for point in parallel::piece(count, size, i) {
             let key = keys[point] as usize;
             if let Some(next) = next.get_mut(key) {
-                let (_, local) = lattice.place(points.positions[point]);
+                let local = lattice.local(points.positions[point]);
                 // SAFETY: `next` runs through the part of this piece and this brick, which the sums above gave to no
                 // other piece and no other brick.
                 unsafe { placed.write(*next as usize, Placed::new(local, point as u32)) };

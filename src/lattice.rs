@@ -29,7 +29,7 @@ impl Lattice {
         let scale = 1.0 / edge;
         let is_long = ((max - min) * scale).cmpge(DVec3::splat(most)).any();
         let base = if is_long { min.max(centre() - most / 2.0 * edge) } else { min };
-        // The same product as in `locate`, so that the point on the maximum falls into the last cube.
+        // The same product as in `place`, so that the point on the maximum falls into the last cube.
         let high = (((max - base) * scale).floor() + 1.0).clamp(DVec3::ONE, DVec3::splat(most));
         Self { base, scale, low: DVec3::ZERO, high }
     }
@@ -77,14 +77,12 @@ impl Lattice {
         (first, (self.high / f64::from(BRICK)).ceil().as_ivec3() - first)
     }
 
-    /// The brick of a point, and the point's place in it, in edges, from 0 up to but not including 4 (paper, Eq. 3).
-    /// `None` for a point that is not finite or out of reach.
+    /// The brick of a point, as whole numbers (paper, Eq. 3). `None` for a point that is not finite or out of reach.
     ///
-    /// In double precision, so that a long thin cloud or a stray point far away costs no accuracy. Whatever cube the
-    /// place says is the cube of the point: nothing computes it a second way.
+    /// In double precision, so that a long thin cloud or a stray point far away costs no accuracy.
     #[inline]
-    pub fn locate(&self, point: Vec3) -> Option<(IVec3, Vec3)> {
-        let place = (point.as_dvec3() - self.base) * self.scale;
+    pub fn brick(&self, point: Vec3) -> Option<DVec3> {
+        let place = self.place(point);
         // Number by number: as masks of three doubles it takes noticeably longer.
         let is_inside = (place.x >= self.low.x)
             & (place.y >= self.low.y)
@@ -92,23 +90,37 @@ impl Lattice {
             & (place.x < self.high.x)
             & (place.y < self.high.y)
             & (place.z < self.high.z);
-        is_inside.then(|| Self::split(place))
+        is_inside.then(|| brick(place))
     }
 
-    /// The same for a point that is known to have a place.
+    /// The same as integers, where there is time.
+    #[inline(never)]
+    pub fn brick_place(&self, point: Vec3) -> Option<IVec3> {
+        self.brick(point).map(|brick| brick.as_ivec3())
+    }
+
+    /// The place of a point in its brick, in edges, from 0 up to but not including 4; it must have one. Whatever cube the
+    /// place says is the cube of the point: nothing computes it a second way.
     #[inline]
-    pub fn place(&self, point: Vec3) -> (IVec3, Vec3) {
-        Self::split((point.as_dvec3() - self.base) * self.scale)
-    }
-
-    #[inline(always)]
-    fn split(place: DVec3) -> (IVec3, Vec3) {
-        let brick = (place * (1.0 / f64::from(BRICK))).as_ivec3();
+    pub fn local(&self, point: Vec3) -> Vec3 {
+        let place = self.place(point);
         // Cut off to what single precision holds, not rounded: so a place never reaches the next cube, and its cube of half
         // the edge, where places are twice as large, is always a part of its cube.
-        let local = (place - brick.as_dvec3() * f64::from(BRICK)) * STEPS;
-        (brick, local.floor().as_vec3() * (1.0 / STEPS) as f32)
+        let local = (place - brick(place) * f64::from(BRICK)) * STEPS;
+        local.floor().as_vec3() * (1.0 / STEPS) as f32
     }
+
+    /// Of a point, in edges.
+    #[inline(always)]
+    fn place(&self, point: Vec3) -> DVec3 {
+        (point.as_dvec3() - self.base) * self.scale
+    }
+}
+
+/// The brick of a place. Rounded down as a double: to make a 32-bit number of it takes longer.
+#[inline(always)]
+fn brick(place: DVec3) -> DVec3 {
+    (place * (1.0 / f64::from(BRICK))).floor()
 }
 
 /// Steps of a place within an edge: those below 4 are single-precision numbers.
@@ -121,7 +133,9 @@ pub(crate) fn octant_in_brick(place: Vec4) -> u32 {
     let (cube, half) = (place.floor(), (2.0 * place).floor());
     // In whole numbers up to 511; a half without twice its cube is 0 or 1.
     let octant = half * Vec4::new(1.0, 2.0, 4.0, 0.0) + cube * Vec4::new(6.0, 28.0, 120.0, 0.0);
-    octant.xyz().element_sum() as u32
+    // After this addition they stand in the last bits: WebAssembly's own conversion looks at what else they might be.
+    const BIT: f32 = (1 << 23) as f32;
+    (octant.xyz().element_sum() + BIT).to_bits() & 511
 }
 
 /// The place of the cube with bit `bit`, in the brick.
@@ -142,7 +156,7 @@ mod tests {
 
     /// The cube of a place, counted from the corner of the grid.
     fn cube(lattice: &Lattice, point: Vec3) -> IVec3 {
-        let (brick, local) = lattice.locate(point).unwrap();
+        let (brick, local) = (lattice.brick_place(point).unwrap(), lattice.local(point));
         assert!(local.cmpge(Vec3::ZERO).all() && local.cmplt(Vec3::splat(BRICK as f32)).all(), "{local}");
         let bit = octant_in_brick(local.extend(0.0)) / 8;
         BRICK * brick + cube_centre(bit).as_ivec3()

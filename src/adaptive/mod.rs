@@ -63,7 +63,7 @@ pub(crate) fn normals(
     progress: &Progress,
     lap: &mut dyn FnMut(&'static str),
 ) -> Result<Adaptive, Error> {
-    let origin = lattice.locate(middle).map_or(IVec3::ZERO, |(brick, _)| brick);
+    let origin = lattice.brick_place(middle).unwrap_or(IVec3::ZERO);
     let base = Level::new(points, *lattice, None, &progress.stage("sort", 0.06..0.3))?;
     lap("sort");
     let normals = Normals::new(points.len(), base.grid.placed.len(), curvature)?;
