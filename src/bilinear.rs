@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::grid::{Grid, Placed, octants};
 use crate::lattice::cube_centre;
 use crate::nodes::Node;
-use crate::normals::{Found, Normals, Writer};
+use crate::normals::{Found, Normals, SHORT, Writer};
 use crate::progress::Stage;
 use crate::surroundings::{MIDDLE, Places, Surroundings};
 use glam::{Mat4, Vec3, Vec4, Vec4Swizzles};
@@ -220,7 +220,10 @@ impl<'a> Cube<'a> {
                     let normal = node.xyz();
                     tally.resolved += u64::from(normal != Vec3::ZERO);
                     // SAFETY: every point of the input stands in the grid once at the most.
-                    unsafe { writer.write(placed.point, normal, node.w) };
+                    unsafe {
+                        writer.write(placed.point, normal);
+                        writer.write_curvature(placed.point, node.w);
+                    }
                 }
                 continue;
             };
@@ -232,9 +235,12 @@ impl<'a> Cube<'a> {
                 unsafe { octant.write_variations(points, u, v, writer) };
             }
             for four in points.chunks(4) {
-                let lanes = octant.normals(along(four, u), along(four, v), self.own);
+                // Where there are fewer, the last stands in for the others.
+                let [a, b, c, d] = std::array::from_fn(|i| four[i.min(four.len() - 1)].lanes());
+                let Mat4 { x_axis: x, y_axis: y, z_axis: z, w_axis: numbers } = Mat4::from_cols(a, b, c, d).transpose();
+                let places = [x, y, z];
                 // SAFETY: as above.
-                unsafe { writer.write_lanes(four.iter().map(|placed| placed.point), lanes) };
+                unsafe { writer.write_lanes(numbers, four.len(), octant.normals(places[u], places[v], self.own)) };
             }
         }
     }
@@ -265,7 +271,7 @@ impl<'a> Cube<'a> {
         let [a, b, c, d] = nodes.map(|node| node.normal);
         let Mat4 { x_axis: x, y_axis: y, z_axis: z, w_axis: variations } = Mat4::from_cols(a, b, c, d).transpose();
         let side = x * self.own.xxxx() + y * self.own.yyyy() + z * self.own.zzzz();
-        let [x, y, z] = [x, y, z].map(|lanes| Vec4::select(side.cmplt(Vec4::ZERO), -lanes, lanes));
+        let [x, y, z] = [x, y, z].map(|lanes| lanes * Vec4::ONE.copysign(side));
         Some(Octant::new(along(u), [x, y, z, along(v)], variations, there.count_ones() as usize))
     }
 
@@ -300,13 +306,6 @@ const STANDINS: [[u8; 4]; 16] = {
     }
     standins
 };
-
-/// One coordinate of up to four points; where there are fewer, the last stands in for the others.
-#[inline(always)]
-fn along(points: &[Placed], axis: usize) -> Vec4 {
-    let at = |i: usize| AsRef::<[f32; 3]>::as_ref(&points[i.min(points.len() - 1)].local)[axis];
-    Vec4::new(at(0), at(1), at(2), at(3))
-}
 
 /// What the points of one octant of a cube share: the four nodes of their 2x2x2 cubes, by lane: the near and the far one
 /// along u, in the near row and in the far row. What holds for a row stands in its first lane.
@@ -369,19 +368,19 @@ impl Octant {
         }
     }
 
-    /// x, y and z of the interpolated unit normals at four places; the own normal where the nodes cancel each other.
+    /// x, y and z of the interpolated normals at four places, not yet of unit length; the own normal where the nodes cancel
+    /// each other.
     #[inline(always)]
     fn normals(&self, u: Vec4, v: Vec4, own: Vec4) -> [Vec4; 3] {
         let weights = self.weights(u, v);
-        let [x, y, z] = std::array::from_fn(|i| mix(self.values[i], self.gains[i], weights));
-        let square = x * x + y * y + z * z;
-        let is_long = square.cmpgt(Vec4::splat(1e-12));
-        let scale = Vec4::ONE / square.sqrt();
-        [
-            Vec4::select(is_long, x * scale, own.xxxx()),
-            Vec4::select(is_long, y * scale, own.yyyy()),
-            Vec4::select(is_long, z * scale, own.zzzz()),
-        ]
+        let normals: [Vec4; 3] = std::array::from_fn(|i| mix(self.values[i], self.gains[i], weights));
+        let [x, y, z] = normals;
+        let is_long = (x * x + y * y + z * z).cmpgt(Vec4::splat(SHORT * SHORT));
+        if is_long.all() {
+            return normals;
+        }
+        let own = [own.xxxx(), own.yyyy(), own.zzzz()];
+        std::array::from_fn(|i| Vec4::select(is_long, normals[i], own[i]))
     }
 }
 

@@ -175,16 +175,39 @@ impl Grid {
 /// centre along x, y and z.
 #[inline(always)]
 pub(crate) fn octants(points: &[Placed], centre: Vec3) -> impl Iterator<Item = (u32, &[Placed])> {
-    let centre = centre.extend(0.0);
-    let octant_of = move |placed: &Placed| placed.lanes().cmpge(centre).bitmask() & 7;
-    let mut rest = points;
+    // Where octants end among the points up to `seen`.
+    let (mut start, mut seen, mut ends) = (0, 0, 0);
     std::iter::from_fn(move || {
-        let octant = octant_of(rest.first()?);
-        let length = 1 + rest[1..].iter().take_while(|placed| octant_of(placed) == octant).count();
-        let (points, others) = rest.split_at(length);
-        rest = others;
-        Some((octant, points))
+        let octant = octant(points.get(start)?, centre);
+        if start == seen {
+            seen = points.len().min(start + 64);
+            ends = octant_ends(&points[start..seen], centre);
+        }
+        let first = start;
+        let length = 1 + ends.trailing_zeros() as usize;
+        start += length;
+        if start < seen {
+            ends >>= length;
+        } else {
+            start = seen + points[seen..].iter().take_while(|placed| self::octant(placed, centre) == octant).count();
+            seen = start;
+        }
+        Some((octant, &points[first..start]))
     })
+}
+
+/// The octant of a point of the cube with some centre.
+#[inline(always)]
+fn octant(placed: &Placed, centre: Vec3) -> u32 {
+    placed.lanes().cmpge(centre.extend(0.0)).bitmask() & 7
+}
+
+/// Of at most 64 points of a cube, a bit for each that is the last of its octant but for the last of all. Without branches,
+/// because nothing foretells them.
+#[inline(always)]
+fn octant_ends(points: &[Placed], centre: Vec3) -> u64 {
+    let pairs = points.iter().zip(&points[1..]).enumerate();
+    pairs.fold(0, |ends, (i, (a, b))| ends | u64::from(octant(a, centre) != octant(b, centre)) << i)
 }
 
 /// Sorts the points by brick: a counting sort, stable, so its result does not depend on how the input is cut.

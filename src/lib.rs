@@ -12,6 +12,8 @@
 #![warn(missing_docs)]
 // What runs once in a call is compiled for size: the modules that browsers download must stay small.
 #![feature(optimize_attribute)]
+// The square roots of four lanes at once.
+#![feature(portable_simd)]
 
 mod adaptive;
 mod baseline;

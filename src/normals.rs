@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::parallel::{self, Filling};
 use crate::points::CHUNK;
+use crate::power::inverse_root;
 use glam::{Mat4, Vec3, Vec4};
 use std::mem::MaybeUninit;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -45,7 +46,7 @@ impl Normals {
 
     /// What one task hands its normals over with; all are written when it is dropped.
     pub fn writer(&self) -> Writer<'_> {
-        Writer { normals: self, gathered: [Vec4::ZERO; GATHERED + 4], length: 0 }
+        Writer { normals: self, gathered: [[0.0; GATHERED + 4]; 4], length: 0, rows: [[0.0; 4]; GATHERED + 4] }
     }
 
     /// Counts points that were given a normal other than zero.
@@ -66,16 +67,19 @@ impl Normals {
     }
 }
 
-/// When more normals than these are gathered, they are written: with four more they take 4 KiB.
+/// When more directions than these are gathered, they are written: with four more they take 4 KiB.
 const GATHERED: usize = 252;
 
-/// Takes the normals of a task. They go to places all over the memory, and every place has to be waited for; of those
-/// that are written right after each other the processor waits for many at once.
+/// Takes directions, and writes the unit normals of a task. They go to places all over the memory, and every place has to be
+/// waited for; of those that are written right after each other the processor waits for many at once. So it does for their
+/// roots.
 pub(crate) struct Writer<'a> {
     normals: &'a Normals,
-    /// Of each point x, y, z and the bits of its number; those from `length` on mean nothing.
-    gathered: [Vec4; GATHERED + 4],
+    /// x, y and z of each direction, and the bits of the point's number; what stands from `length` on means nothing.
+    gathered: [[f32; GATHERED + 4]; 4],
     length: usize,
+    /// What is written: of each point x, y and z of the unit normal, and the bits of its number.
+    rows: [[f32; 4]; GATHERED + 4],
 }
 
 impl Writer<'_> {
@@ -84,37 +88,30 @@ impl Writer<'_> {
         self.normals.curvature.is_some()
     }
 
-    /// Takes the normal of a point, of either sign, and its curvature; zero if nothing determines them.
+    /// Takes the direction of the normal of a point, of either sign and of any length above [`SHORT`]; zero if nothing
+    /// determines it.
     ///
     /// # Safety
     /// At most once for each point.
     #[inline(always)]
-    pub unsafe fn write(&mut self, point: u32, normal: Vec3, curvature: f32) {
+    pub unsafe fn write(&mut self, point: u32, direction: Vec3) {
         // SAFETY: by the caller's promise.
-        unsafe {
-            self.write_lanes([point].into_iter(), normal.to_array().map(Vec4::splat));
-            self.write_curvature(point, curvature);
-        }
+        unsafe { self.write_lanes(Vec4::splat(f32::from_bits(point)), 1, direction.to_array().map(Vec4::splat)) };
     }
 
-    /// Takes the normals of at most four points, lane by lane, of either sign.
+    /// Takes the directions of `count` points, one to four, lane by lane. `points` has the bits of their numbers.
     ///
     /// # Safety
     /// At most once for each point, which is written later.
     #[inline(always)]
-    pub unsafe fn write_lanes(&mut self, points: impl Iterator<Item = u32>, normals: [Vec4; 3]) {
-        let [x, y, z] = face(normals);
-        let mut numbers = [0; 4];
-        let mut count = 0;
-        for (number, point) in numbers.iter_mut().zip(points) {
-            *number = point;
-            count += 1;
+    pub unsafe fn write_lanes(&mut self, points: Vec4, count: usize, [x, y, z]: [Vec4; 3]) {
+        // It never is more, but so the compiler knows.
+        let length = self.length.min(GATHERED);
+        for (row, lanes) in self.gathered.iter_mut().zip([x, y, z, points]) {
+            // All four; the next overwrite those too many.
+            row[length..length + 4].copy_from_slice(&lanes.to_array());
         }
-        let rows = Mat4::from_cols(x, y, z, bytemuck::cast(numbers)).transpose();
-        let rows = [rows.x_axis, rows.y_axis, rows.z_axis, rows.w_axis];
-        // All four; the next overwrite those too many.
-        self.gathered[self.length..self.length + 4].copy_from_slice(&rows);
-        self.length += count;
+        self.length = length + count;
         if self.length > GATHERED {
             self.flush();
         }
@@ -136,10 +133,17 @@ impl Writer<'_> {
     #[inline(never)]
     fn flush(&mut self) {
         let length = std::mem::take(&mut self.length);
-        for row in bytemuck::cast_slice::<Vec4, [f32; 4]>(&self.gathered[..length]) {
-            let [x, y, z, point] = *row;
+        for (four, rows) in self.rows.chunks_exact_mut(4).enumerate().take(length.div_ceil(4)) {
+            let [x, y, z, points] = self.gathered.each_ref().map(|row| Vec4::from_slice(&row[4 * four..]));
+            let square = x * x + y * y + z * z;
+            // Zero stays zero.
+            let scale = inverse_root(square.max(Vec4::splat(f32::MIN_POSITIVE)));
+            let [x, y, z] = face([x, y, z].map(|lanes| lanes * scale));
+            rows.copy_from_slice(&Mat4::from_cols(x, y, z, points).transpose().to_cols_array_2d());
+        }
+        for [x, y, z, point] in &self.rows[..length] {
             // SAFETY: by the promise of who called `write_lanes`.
-            unsafe { self.normals.normals.write(point.to_bits() as usize, Vec3::new(x, y, z)) };
+            unsafe { self.normals.normals.write(point.to_bits() as usize, Vec3::new(*x, *y, *z)) };
         }
     }
 }
@@ -150,6 +154,9 @@ impl Drop for Writer<'_> {
     }
 }
 
+/// A direction that is no longer than this tells nothing.
+pub(crate) const SHORT: f32 = 1e-6;
+
 /// Chooses the signs: `x + 2y + 4z >= 0`, a plane that few man-made walls are parallel to.
 #[inline(always)]
 fn face([x, y, z]: [Vec4; 3]) -> [Vec4; 3] {
@@ -157,7 +164,7 @@ fn face([x, y, z]: [Vec4; 3]) -> [Vec4; 3] {
     // On the plane itself the first component that is not zero decides.
     let first = Vec4::select(x.cmpeq(Vec4::ZERO), y, x);
     let side = Vec4::select(side.cmpeq(Vec4::ZERO), first, side);
-    let sign = Vec4::select(side.cmplt(Vec4::ZERO), Vec4::NEG_ONE, Vec4::ONE);
+    let sign = Vec4::ONE.copysign(side);
     // Adding zero turns -0 into 0.
     [x, y, z].map(|lanes| lanes * sign + Vec4::ZERO)
 }

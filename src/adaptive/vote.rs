@@ -8,8 +8,9 @@ use super::matrix::{dot_lanes, times_lanes, transposed};
 use crate::error::Error;
 use crate::grid::Placed;
 use crate::lattice::cube_centre;
-use crate::normals::{Normals, Writer};
+use crate::normals::{Normals, SHORT, Writer};
 use crate::parallel::Filling;
+use crate::power::{inverse_root, root};
 use crate::progress::Stage;
 use glam::{Vec3, Vec4};
 use std::f32::consts::FRAC_1_SQRT_2;
@@ -102,13 +103,19 @@ impl<'a> Task<'a> {
             self.ballot.invite(&self.near, chosen, quartile(noises));
         }
         let placed = level.points(cube);
-        for four in placed.chunks(4) {
-            let found = match &smooth {
-                Some(smooth) => smooth.normals(four, cube_centre(bit)),
-                None => self.ballot.normals(four, cube_centre(bit)),
-            };
-            // SAFETY: every point of the input stands in one cube that is wanted and not divided.
-            unsafe { self.writer.write_lanes(four.iter().map(|p| level.name(p)), found) };
+        let centre = cube_centre(bit);
+        if let Some(smooth) = &smooth {
+            for four in placed.chunks(4) {
+                let name = |i: usize| f32::from_bits(level.name(&four[i.min(four.len() - 1)]));
+                let names = Vec4::new(name(0), name(1), name(2), name(3));
+                // SAFETY: every point of the input stands in one cube that is wanted and not divided.
+                unsafe { self.writer.write_lanes(names, four.len(), smooth.directions(four, centre)) };
+            }
+        } else {
+            for p in placed {
+                // SAFETY: as above.
+                unsafe { self.writer.write(level.name(p), self.ballot.vote(p.local - centre)) };
+            }
         }
         if self.writer.has_curvature() {
             for p in placed {
@@ -167,16 +174,14 @@ struct Smooth {
 }
 
 impl Smooth {
-    /// The normals of up to four points.
+    /// The directions of the normals of up to four points.
     #[inline(never)]
-    fn normals(&self, points: &[Placed], cube: Vec3) -> [Vec4; 3] {
-        let local = |i: usize| points[i.min(points.len() - 1)].local - (self.centre + cube);
-        let (a, b, c, d) = (local(0), local(1), local(2), local(3));
-        let places = [Vec4::new(a.x, b.x, c.x, d.x), Vec4::new(a.y, b.y, c.y, d.y), Vec4::new(a.z, b.z, c.z, d.z)];
+    fn directions(&self, points: &[Placed], cube: Vec3) -> [Vec4; 3] {
+        let centre = (self.centre + cube).extend(0.0);
+        let [x, y, z, _] = transposed(std::array::from_fn(|i| points[i.min(points.len() - 1)].lanes() - centre));
+        let places = [x, y, z];
         let turns = times_lanes(self.turn, places);
-        let normals: [Vec4; 3] = std::array::from_fn(|axis| self.normal[axis] + turns[axis]);
-        let scale = Vec4::ONE / dot_lanes(normals, normals).sqrt();
-        normals.map(|lanes| lanes * scale)
+        std::array::from_fn(|axis| self.normal[axis] + turns[axis])
     }
 }
 
@@ -233,7 +238,7 @@ impl Voters {
         let height = self.height + dot_lanes(d, self.slope) + 0.5 * dot_lanes(d, bend);
         let square = dot_lanes(slope, slope).max(Vec4::splat(f32::MIN_POSITIVE));
         let far = dot_lanes(d, d) * (0.5 / (SPEAK * SPEAK)) + self.fall * height * height / square;
-        let scale = Vec4::ONE / square.sqrt();
+        let scale = inverse_root(square);
         Votes { weight: fade(far) * self.weight, normal: slope.map(|lanes| lanes * scale), scale }
     }
 }
@@ -310,7 +315,7 @@ impl Ballot {
         let mut sums = [Vec4::ZERO; 9];
         for (votes, voters) in self.votes.iter().zip(&self.voters) {
             let cosine = dot_lanes(normal, votes.normal);
-            let limit = deviation + voters.error.sqrt();
+            let limit = deviation + root(voters.error);
             if (1.0 - cosine * cosine).cmpgt(limit * limit).any() {
                 return None;
             }
@@ -329,17 +334,7 @@ impl Ballot {
         Some(Smooth { centre, normal: lanes([x, y, z]), turn: [lanes([xx, yy, zz]), lanes([yz, xz, xy])] })
     }
 
-    /// The normals of up to four points.
-    fn normals(&mut self, points: &[Placed], cube: Vec3) -> [Vec4; 3] {
-        let mut normals = [Vec4::ZERO; 3];
-        for (i, p) in points.iter().enumerate().take(4) {
-            let normal = self.vote(p.local - cube).to_array();
-            normals.iter_mut().zip(normal).for_each(|(lanes, value)| lanes.as_mut()[i] = value);
-        }
-        normals
-    }
-
-    /// The normal at a point.
+    /// The direction of the normal at a point.
     #[inline(never)]
     fn vote(&mut self, point: Vec3) -> Vec3 {
         let best = self.ask(point);
@@ -364,7 +359,7 @@ impl Ballot {
             (0..3).for_each(|axis| sum[axis] += weight * votes.normal[axis]);
         }
         let sum = Vec3::from_array(sum.map(Vec4::element_sum));
-        sum.try_normalize().unwrap_or(best.normal)
+        if sum.length_squared() > SHORT * SHORT { sum } else { best.normal }
     }
 }
 

@@ -65,8 +65,12 @@ pub(crate) fn normals(
             };
             resolved += u64::from(plane.is_some());
             let (normal, variation) = plane.map_or((Vec3::ZERO, 0.0), |plane| (plane.normal, plane.variation));
+            let point = tree.places[place].point;
             // SAFETY: a point stands in the tree once.
-            unsafe { writer.write(tree.places[place].point, normal, variation) };
+            unsafe {
+                writer.write(point, normal);
+                writer.write_curvature(point, variation);
+            }
         }
         normals.add_resolved(resolved);
     })?;
