@@ -3,12 +3,13 @@
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::{Grid, Placed, octants};
+use crate::lanes::transposed;
 use crate::lattice::cube_centre;
 use crate::nodes::Node;
 use crate::normals::{Found, Normals, SHORT, Writer};
 use crate::progress::Stage;
 use crate::surroundings::{MIDDLE, Places, Surroundings};
-use glam::{Mat4, Vec3, Vec4, Vec4Swizzles};
+use glam::{Vec3, Vec4, Vec4Swizzles};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// Interpolates all points; those outside the grid get the zero vector. One pass over the sorted points.
@@ -236,8 +237,8 @@ impl<'a> Cube<'a> {
             }
             for four in points.chunks(4) {
                 // Where there are fewer, the last stands in for the others.
-                let [a, b, c, d] = std::array::from_fn(|i| four[i.min(four.len() - 1)].lanes());
-                let Mat4 { x_axis: x, y_axis: y, z_axis: z, w_axis: numbers } = Mat4::from_cols(a, b, c, d).transpose();
+                let rows = std::array::from_fn(|i| four[i.min(four.len() - 1)].lanes());
+                let [x, y, z, numbers] = transposed(rows);
                 let places = [x, y, z];
                 // SAFETY: as above.
                 unsafe { writer.write_lanes(numbers, four.len(), octant.normals(places[u], places[v], self.own)) };
@@ -268,8 +269,7 @@ impl<'a> Cube<'a> {
         let nodes = STANDINS[there as usize].map(|i| &self.nodes.nodes[places[usize::from(i)]]);
         let [_, u, v] = self.turn.axes;
         let along = |axis: usize| Vec4::from_array(nodes.map(|node| AsRef::<[f32; 4]>::as_ref(&node.position)[axis]));
-        let [a, b, c, d] = nodes.map(|node| node.normal);
-        let Mat4 { x_axis: x, y_axis: y, z_axis: z, w_axis: variations } = Mat4::from_cols(a, b, c, d).transpose();
+        let [x, y, z, variations] = transposed(nodes.map(|node| node.normal));
         let side = x * self.own.xxxx() + y * self.own.yyyy() + z * self.own.zzzz();
         let [x, y, z] = [x, y, z].map(|lanes| lanes * Vec4::ONE.copysign(side));
         Some(Octant::new(along(u), [x, y, z, along(v)], variations, there.count_ones() as usize))

@@ -23,6 +23,7 @@ mod cell;
 mod error;
 mod estimate;
 mod grid;
+mod lanes;
 mod lattice;
 mod median;
 mod nodes;

@@ -1,10 +1,10 @@
 //! One normal for each point, and if wanted its curvature, as every method hands them over.
 
 use crate::error::Error;
+use crate::lanes::{inverse_root, load, transposed};
 use crate::parallel::{self, Filling};
 use crate::points::CHUNK;
-use crate::power::inverse_root;
-use glam::{Mat4, Vec3, Vec4};
+use glam::{Vec3, Vec4};
 use std::mem::MaybeUninit;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -134,12 +134,12 @@ impl Writer<'_> {
     fn flush(&mut self) {
         let length = std::mem::take(&mut self.length);
         for (four, rows) in self.rows.chunks_exact_mut(4).enumerate().take(length.div_ceil(4)) {
-            let [x, y, z, points] = self.gathered.each_ref().map(|row| Vec4::from_slice(&row[4 * four..]));
+            let [x, y, z, points] = self.gathered.each_ref().map(|row| load(&row[4 * four..]));
             let square = x * x + y * y + z * z;
             // Zero stays zero.
             let scale = inverse_root(square.max(Vec4::splat(f32::MIN_POSITIVE)));
             let [x, y, z] = face([x, y, z].map(|lanes| lanes * scale));
-            rows.copy_from_slice(&Mat4::from_cols(x, y, z, points).transpose().to_cols_array_2d());
+            rows.copy_from_slice(&transposed([x, y, z, points]).map(|row| row.to_array()));
         }
         for [x, y, z, point] in &self.rows[..length] {
             // SAFETY: by the promise of who called `write_lanes`.

@@ -1,8 +1,6 @@
-//! Powers and logarithms of two, by series: the same bits on every platform, and without the tables of a library. And roots.
+//! Powers and logarithms of two, by series: the same bits on every platform, and without the tables of a library.
 
-use glam::Vec4;
 use std::f64::consts::{LN_2, SQRT_2};
-use std::simd::{StdFloat, f32x4};
 
 /// The logarithm to base 2 of a number above zero, right to some 50 bits, exact for powers of two. That of zero and of
 /// numbers that are nearly so is about -1023.
@@ -37,18 +35,6 @@ pub(crate) fn exp2(exponent: f64) -> f64 {
         sum = 1.0 + sum * x / f64::from(term);
     }
     sum * f64::from_bits(((whole + 1023.0) as u64) << 52)
-}
-
-/// The square root of each lane, all at once; [`Vec4::sqrt`] takes them one by one (glam 0.34), four times as long.
-#[inline(always)]
-pub(crate) fn root(lanes: Vec4) -> Vec4 {
-    Vec4::from_array(f32x4::from_array(lanes.to_array()).sqrt().to_array())
-}
-
-/// One over the square root of each lane.
-#[inline(always)]
-pub(crate) fn inverse_root(lanes: Vec4) -> Vec4 {
-    Vec4::ONE / root(lanes)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Symmetric matrices and vectors, one or four at a time.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{Mat3, Mat4, Vec3, Vec4};
+use glam::{Mat3, Vec3, Vec4};
 
 /// A symmetric matrix in single precision: xx, yy, zz and yz, xz, xy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -53,11 +53,4 @@ pub(super) fn times_lanes([d, o]: [[Vec4; 3]; 2], [x, y, z]: [Vec4; 3]) -> [Vec4
 #[inline(always)]
 pub(super) fn dot_lanes(a: [Vec4; 3], b: [Vec4; 3]) -> Vec4 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// Rows for columns.
-#[inline(always)]
-pub(super) fn transposed([a, b, c, d]: [Vec4; 4]) -> [Vec4; 4] {
-    let Mat4 { x_axis, y_axis, z_axis, w_axis } = Mat4::from_cols(a, b, c, d).transpose();
-    [x_axis, y_axis, z_axis, w_axis]
 }

@@ -1,7 +1,8 @@
 //! What surfaces are fitted to: points, or the centroids of several with their covariance.
 
-use super::matrix::{Matrix, transposed};
+use super::matrix::Matrix;
 use crate::error::Error;
+use crate::lanes::{load, transposed};
 use crate::parallel::Filling;
 use glam::{DVec3, Vec3, Vec4};
 use std::ops::Range;
@@ -147,11 +148,11 @@ impl Window {
         for i in (0..range.len()).step_by(4) {
             let (from, to) = (range.start + i, self.count + i);
             for number in 0..NUMBERS {
-                let four = Vec4::from_slice(&samples.numbers[number * samples.stride + from..]);
+                let four = load(&samples.numbers[number * samples.stride + from..]);
                 let shift = shifts.get(number).copied().unwrap_or(0.0);
                 (four + shift).write_to_slice(&mut self.numbers[number][to..]);
             }
-            let points = Vec4::from_slice(&samples.numbers[POINTS * samples.stride + from..]);
+            let points = load(&samples.numbers[POINTS * samples.stride + from..]);
             (points * share).write_to_slice(&mut self.numbers[WEIGHT][to..]);
         }
         self.count += range.len();
@@ -164,7 +165,7 @@ impl Window {
     /// Four samples' number.
     #[inline(always)]
     fn four(&self, number: usize, sample: usize) -> Vec4 {
-        Vec4::from_slice(&self.numbers[number][sample..])
+        load(&self.numbers[number][sample..])
     }
 
     #[inline(always)]

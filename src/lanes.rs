@@ -1,0 +1,29 @@
+//! Four numbers at once, where glam 0.34 takes them one by one.
+
+use glam::{Mat4, Vec4};
+use std::simd::{StdFloat, f32x4};
+
+/// The first four of some numbers.
+#[inline(always)]
+pub(crate) fn load(numbers: &[f32]) -> Vec4 {
+    bytemuck::cast::<[f32; 4], _>(numbers[..4].try_into().unwrap())
+}
+
+/// Rows for columns.
+#[inline(always)]
+pub(crate) fn transposed([a, b, c, d]: [Vec4; 4]) -> [Vec4; 4] {
+    let Mat4 { x_axis, y_axis, z_axis, w_axis } = Mat4::from_cols(a, b, c, d).transpose();
+    [x_axis, y_axis, z_axis, w_axis]
+}
+
+/// The square root of each lane.
+#[inline(always)]
+pub(crate) fn root(lanes: Vec4) -> Vec4 {
+    bytemuck::cast(f32x4::from_array(lanes.to_array()).sqrt().to_array())
+}
+
+/// One over the square root of each lane.
+#[inline(always)]
+pub(crate) fn inverse_root(lanes: Vec4) -> Vec4 {
+    Vec4::ONE / root(lanes)
+}
