@@ -7,7 +7,7 @@ use super::level::Level;
 use super::matrix::{dot_lanes, times_lanes};
 use crate::error::Error;
 use crate::grid::Placed;
-use crate::lanes::{inverse_root, root, transposed};
+use crate::lanes::{inverse_root, load, root, transposed};
 use crate::lattice::cube_centre;
 use crate::normals::{Normals, SHORT, Writer};
 use crate::parallel::Filling;
@@ -141,19 +141,18 @@ fn quartile(values: impl Iterator<Item = f32> + Clone) -> f32 {
     if rank == 0 {
         return f32::INFINITY;
     }
-    // The least so far, in their order.
-    let mut least = [f32::INFINITY; 32];
-    for value in values {
-        let mut place = rank;
-        while place > 0 && least[place - 1] > value {
-            least[place] = least[place - 1];
-            place -= 1;
-        }
-        if least[place] > value {
-            least[place] = value;
+    // The least so far, in their order, after one that is less than all.
+    let mut least = [f32::INFINITY; 4 + 32];
+    least[3] = f32::NEG_INFINITY;
+    for value in values.filter(|value| *value < f32::INFINITY) {
+        // Each gives way to the one before it, if that is more than the value, or else to the value. Four at once, because
+        // nothing foretells how far a value goes.
+        for i in (1..=1 + rank / 4).rev().map(|four| 4 * four) {
+            let (here, before) = (load(&least[i..]), load(&least[i - 1..]));
+            here.min(Vec4::splat(value)).max(before).write_to_slice(&mut least[i..]);
         }
     }
-    least[rank]
+    least[4 + rank]
 }
 
 /// `exp(-x)`, nearly: the same bits everywhere. Zero from some 10,000.
