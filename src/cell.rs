@@ -115,8 +115,9 @@ struct Probes {
     scale: f64,
     /// Sorted by cube.
     chosen: Vec<(Cube, u32)>,
-    /// A bit for each of 2^16 hashes of a cube: turns most points away at once.
-    filter: Vec<u64>,
+    /// By hash of their cubes, open-addressed: the number of each in `chosen`, plus one; 0 where there is none. Mostly empty, as
+    /// most points are in no probe.
+    table: Vec<u16>,
 }
 
 impl Probes {
@@ -130,23 +131,26 @@ impl Probes {
         let sample: Vec<DVec3> = sorted.into_iter().map(|p| DVec3::from_array(p.map(from_ordinal))).collect();
         let wanted = (PROBED_POINTS / count as f64).max(1.0 / 64.0);
         let step = sample.len().div_ceil(PROBES).max(1);
-        let mut probes =
-            Self { origin: bulk.median, edge: extent, scale: 0.0, chosen: Vec::new(), filter: vec![0; 1024] };
+        let mut probes = Self { origin: bulk.median, edge: extent, scale: 0.0, chosen: Vec::new(), table: Vec::new() };
         for halvings in 0..64 {
             probes.edge = extent * exp2(-f64::from(halvings));
             probes.scale = 1.0 / probes.edge;
             let mut cubes: Vec<Cube> = sample.iter().step_by(step).map(|p| probes.cube(*p).0).collect();
             cubes.sort_unstable();
             probes.chosen = cubes.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as u32)).collect();
-            let is_inside = |point: &DVec3| probes.search(probes.cube(*point).0).is_some();
+            probes.table = vec![0; SLOTS];
+            for (number, (cube, _)) in (1..).zip(&probes.chosen) {
+                let mut slot = hash(*cube);
+                while probes.table[slot] != 0 {
+                    slot = (slot + 1) % SLOTS;
+                }
+                probes.table[slot] = number;
+            }
+            let is_inside = |point: &DVec3| probes.find(probes.cube(*point).0).is_some();
             let others = sample.iter().enumerate().filter(|(i, point)| i % step != 0 && is_inside(point)).count();
             if others as f64 <= wanted * sample.len() as f64 {
                 break;
             }
-        }
-        for (cube, _) in &probes.chosen {
-            let bit = hash(*cube);
-            probes.filter[bit / 64] |= 1 << (bit % 64);
         }
         probes
     }
@@ -160,13 +164,21 @@ impl Probes {
     }
 
     /// The number of the probe at a cube.
+    #[inline(always)]
     fn find(&self, cube: Cube) -> Option<u32> {
-        let bit = hash(cube);
-        if self.filter[bit / 64] >> (bit % 64) & 1 == 1 { self.search(cube) } else { None }
+        let slot = hash(cube);
+        if self.table[slot] == 0 { None } else { self.search(cube, slot) }
     }
 
-    fn search(&self, cube: Cube) -> Option<u32> {
-        self.chosen.binary_search_by_key(&cube, |(cube, _)| *cube).ok().map(|probe| probe as u32)
+    #[inline(never)]
+    fn search(&self, cube: Cube, mut slot: usize) -> Option<u32> {
+        loop {
+            let probe = u32::from(self.table[slot]).checked_sub(1)?;
+            if self.chosen[probe as usize].0 == cube {
+                return Some(probe);
+            }
+            slot = (slot + 1) % SLOTS;
+        }
     }
 
     /// Points in an occupied cube for the probes' edge halved 0 to [`LEVELS`] times.
@@ -213,6 +225,9 @@ impl Probes {
     }
 }
 
+/// Of the table of probes.
+const SLOTS: usize = 1 << 14;
+
 fn hash(cube: Cube) -> usize {
     // After this addition whole numbers stand in the last bits.
     const BIT: f64 = (3u64 << 51) as f64;
@@ -220,7 +235,7 @@ fn hash(cube: Cube) -> usize {
     let mixed = x.wrapping_mul(0x9E37_79B9_7F4A_7C15)
         ^ y.wrapping_mul(0xC2B2_AE3D_27D4_EB4F)
         ^ z.wrapping_mul(0x1656_67B1_9E37_79F9);
-    (mixed >> 48) as usize
+    (mixed >> 50) as usize
 }
 
 /// Interleaves the lowest [`LEVELS`] bits of three numbers.
