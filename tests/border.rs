@@ -280,12 +280,13 @@ fn bytes_that_are_not_whole_points_are_refused() {
 }
 
 #[wasm_bindgen_test]
-fn a_buffer_is_zeroed_and_begins_at_a_multiple_of_8() {
-    for length in [0, 1, 7, 8, 1001] {
+fn a_buffer_holds_what_is_written_and_begins_at_a_multiple_of_8() {
+    for length in [0u32, 1, 7, 8, 1001] {
         let buffer = Buffer::new(f64::from(length)).unwrap();
         assert_eq!(buffer.byte_length(), length as usize);
         assert!(length == 0 || buffer.pointer().is_multiple_of(8));
-        assert!(view(&buffer).to_vec().iter().all(|&byte| byte == 0));
+        view(&buffer).fill(7, 0, length);
+        assert!(view(&buffer).to_vec().iter().all(|&byte| byte == 7));
     }
 }
 
