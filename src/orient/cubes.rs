@@ -1,6 +1,6 @@
 //! The cubes whose points are parted into patches: so large that a noisy surface is no thicker than one.
 
-use super::patches::aligned;
+use super::patches::{aligned, sort_few};
 use crate::cell::Density;
 use crate::error::Error;
 use crate::grid::{Grid, Placed};
@@ -54,7 +54,7 @@ pub(super) fn sort(
 /// some bricks, or `scale` times as large, as many as fit into a brick.
 fn noise(grid: &Grid, normals: &[Vec3], scale: f32) -> f32 {
     /// Bricks to look at: their cubes are enough for a median.
-    const BRICKS: usize = 64;
+    const BRICKS: usize = 256;
     let along = (BRICK as f32 / scale) as usize;
     let (mut cubes, mut gaps, mut deviations) = (vec![Vec::new(); along.pow(3)], Vec::new(), Vec::new());
     for brick in spread(grid.bricks.len(), BRICKS) {
@@ -90,7 +90,7 @@ fn deviation(points: &[Placed], normals: &[Vec3], gaps: &mut Vec<f32>) -> Option
     let normal = normal.try_normalize()?;
     gaps.clear();
     gaps.extend(points.iter().map(|point| point.local.dot(normal)));
-    gaps.sort_unstable_by(f32::total_cmp);
+    sort_few(gaps);
     for i in 1..gaps.len() {
         gaps[i - 1] = gaps[i] - gaps[i - 1];
     }

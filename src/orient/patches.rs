@@ -8,6 +8,7 @@ use crate::parallel::{Filling, concatenated};
 use crate::points::{grow, reserve, starts};
 use crate::progress::Stage;
 use glam::Vec3;
+use std::cmp::Ordering;
 use std::mem::MaybeUninit;
 use std::ops::Range;
 
@@ -145,7 +146,7 @@ fn split(
     // By place, so that the order of the input does not matter.
     order.clear();
     order.extend(points.iter().enumerate().map(|(i, point)| (key(point.local), i as u32)));
-    sort(order);
+    sort_few(order);
     for &(_, i) in &*order {
         let (place, normal) = (points[i as usize].local - centre, normals[i as usize]);
         if normal == Vec3::ZERO {
@@ -205,21 +206,21 @@ fn key(place: Vec3) -> u64 {
     x << 42 | y << 21 | z
 }
 
-/// Sorts by key. Most cubes have few points, and for these nothing is faster.
-fn sort(order: &mut [(u64, u32)]) {
+/// Sorts what has an order. Most cubes have few points, and for these nothing is faster.
+pub(super) fn sort_few<T: Copy + PartialOrd>(list: &mut [T]) {
     const FEW: usize = 32;
-    if order.len() > FEW {
-        order.sort_unstable();
+    if list.len() > FEW {
+        list.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
         return;
     }
-    for end in 1..order.len() {
-        let one = order[end];
+    for end in 1..list.len() {
+        let one = list[end];
         let mut place = end;
-        while place > 0 && one < order[place - 1] {
-            order[place] = order[place - 1];
+        while place > 0 && one < list[place - 1] {
+            list[place] = list[place - 1];
             place -= 1;
         }
-        order[place] = one;
+        list[place] = one;
     }
 }
 
