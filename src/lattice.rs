@@ -107,7 +107,7 @@ impl Lattice {
         // Cut off to what single precision holds, not rounded: so a place never reaches the next cube, and its cube of half
         // the edge, where places are twice as large, is always a part of its cube.
         let local = (place - brick(place) * f64::from(BRICK)) * STEPS;
-        local.floor().as_vec3() * (1.0 / STEPS) as f32
+        floor(local).as_vec3() * (1.0 / STEPS) as f32
     }
 
     /// Of a point, in edges.
@@ -117,10 +117,17 @@ impl Lattice {
     }
 }
 
-/// The brick of a place. Rounded down as a double: to make a 32-bit number of it takes longer.
+/// The brick of a place.
 #[inline(always)]
 fn brick(place: DVec3) -> DVec3 {
-    (place * (1.0 / f64::from(BRICK))).floor()
+    floor(place * (1.0 / f64::from(BRICK)))
+}
+
+/// Rounds down what is not negative and below 2^31. WebAssembly has an instruction for it, and its conversion to an integer
+/// looks at what else the number might be; with the least of x86-64 it is the other way round.
+#[inline(always)]
+fn floor(numbers: DVec3) -> DVec3 {
+    if cfg!(target_arch = "wasm32") { numbers.floor() } else { numbers.as_ivec3().as_dvec3() }
 }
 
 /// Steps of a place within an edge: those below 4 are single-precision numbers.
