@@ -104,7 +104,7 @@ impl Density {
     }
 }
 
-/// Where a cube lies: whole numbers, as the bits of doubles. They are only compared, and integers would take longer.
+/// Where a cube lies: whole numbers, as the bits of doubles. They are only compared and hashed, and integers would take longer.
 type Cube = [i64; 3];
 
 /// Cubes of one grid that hold a chosen point each, with the number of chosen points in them.

@@ -343,3 +343,30 @@ fn blocks(first_point: &[u32]) -> Vec<Range<usize>> {
     }
     blocks
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Also of more points than are looked at in one go, ending there and beside it.
+    #[test]
+    fn octants_are_runs_of_points_on_the_same_sides() {
+        let of = |placed: &Placed| placed.local.cmpge(Vec3::splat(0.5)).bitmask();
+        for first in [0, 1, 2, 7, 63, 64, 65, 128] {
+            for second in [1, 3, 60, 63, 64, 65, 200] {
+                let point = |i: u32| if i < first { 0.2 } else { 0.7 + 0.1 * f32::from(i >= first + second) };
+                let points: Vec<Placed> = (0..first + second + 5)
+                    .map(|i| Placed::new(Vec3::new(point(i), 0.6, if i < first + second { 0.1 } else { 0.9 }), i))
+                    .collect();
+                let found: Vec<(u32, &[Placed])> = octants(&points, Vec3::splat(0.5)).collect();
+                let expected: Vec<&[Placed]> = points.chunk_by(|a, b| of(a) == of(b)).collect();
+                assert_eq!(found.len(), expected.len(), "{first} and {second} points");
+                for ((octant, points), expected) in found.into_iter().zip(expected) {
+                    assert_eq!((octant, points.len()), (of(&expected[0]), expected.len()));
+                    assert!(std::ptr::eq(points, expected));
+                }
+            }
+        }
+        assert_eq!(octants(&[], Vec3::ZERO).count(), 0);
+    }
+}

@@ -1,4 +1,4 @@
-//! Four numbers at once, where glam 0.34 takes them one by one.
+//! Four numbers at once, where glam 0.34 takes them one by one, and the transposed of four times four.
 
 use glam::{Mat4, Vec4};
 use std::simd::{StdFloat, f32x4};

@@ -124,7 +124,7 @@ fn brick(place: DVec3) -> DVec3 {
 }
 
 /// Rounds down what is not negative and below 2^31. WebAssembly has an instruction for it, and its conversion to an integer
-/// looks at what else the number might be; with the least of x86-64 it is the other way round.
+/// looks at what else the number might be; x86-64 without SSE4.1 has none, and would call a function. The number is the same.
 #[inline(always)]
 fn floor(numbers: DVec3) -> DVec3 {
     if cfg!(target_arch = "wasm32") { numbers.floor() } else { numbers.as_ivec3().as_dvec3() }

@@ -67,20 +67,21 @@ impl Normals {
     }
 }
 
-/// When more directions than these are gathered, they are written: with four more they take 4 KiB.
+/// When more directions than these are gathered, they are written: with four more they take 4 KiB, and as much again as rows.
 const GATHERED: usize = 252;
 
 /// Takes directions, and writes the unit normals of a task. They go to places all over the memory, and every place has to be
 /// waited for; of those that are written right after each other the processor waits for many at once. So it does for their
-/// roots. Aligned, so that no four gathered ones lie across two cache lines.
-#[repr(align(16))]
+/// roots.
+#[repr(C, align(16))]
 pub(crate) struct Writer<'a> {
-    normals: &'a Normals,
-    /// x, y and z of each direction, and the bits of the point's number; what stands from `length` on means nothing.
+    /// x, y and z of each direction, and the bits of the point's number; what stands from `length` on means nothing. First
+    /// and aligned, so that no four lie across two cache lines.
     gathered: [[f32; GATHERED + 4]; 4],
-    length: usize,
     /// What is written: of each point x, y and z of the unit normal, and the bits of its number.
     rows: [[f32; 4]; GATHERED + 4],
+    length: usize,
+    normals: &'a Normals,
 }
 
 impl Writer<'_> {
@@ -100,7 +101,8 @@ impl Writer<'_> {
         unsafe { self.write_lanes(Vec4::splat(f32::from_bits(point)), 1, direction.to_array().map(Vec4::splat)) };
     }
 
-    /// Takes the directions of `count` points, one to four, lane by lane. `points` has the bits of their numbers.
+    /// Takes the directions of `count` points, one to four, lane by lane, as [`Writer::write`] does; those too short become zero.
+    /// `points` has the bits of their numbers.
     ///
     /// # Safety
     /// At most once for each point, which is written later.

@@ -143,7 +143,7 @@ impl Symmetric {
     #[inline(always)]
     pub fn smallest_eigenvalue(&self) -> f64 {
         let (trace, minors, determinant) = (self.diagonal.element_sum(), self.minors(), self.determinant());
-        // Nearly lambda2, if not isotropic.
+        // Between half of lambda2 and twice it.
         let second = minors / trace;
         let mut root = 0.0;
         for _ in 0..24 {

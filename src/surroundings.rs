@@ -6,7 +6,7 @@ use glam::{IVec3, UVec3, Vec3, Vec4};
 
 /// The cubes in and one deep round a brick: 6x6x6 places, x fastest, the brick's first cube at (1, 1, 1).
 pub(crate) struct Surroundings {
-    /// Those that are occupied.
+    /// Those that are occupied, of other bricks only where cubes of the own lie beside.
     pub occupied: Places,
     /// Their numbers.
     cubes: [u32; Places::COUNT],
@@ -22,7 +22,7 @@ impl Surroundings {
         self.occupied = Places::NONE;
         let (place, own) = (grid.bricks.places[brick], grid.masks[brick]);
         for (Side { step, facing, shift }, opposite) in SIDES.iter().zip(SIDES.iter().rev()) {
-            // Only what lies beside cubes of the brick is asked for.
+            // Only what lies beside cubes of the brick is asked for. The last steps are the opposites of the first.
             if own & opposite.facing == 0 {
                 continue;
             }

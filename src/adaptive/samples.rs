@@ -112,7 +112,7 @@ impl Writing {
 /// The samples of a neighbourhood, against the centre of its cube, each with its weight in the sums.
 ///
 /// Aligned, so that no four lie across two cache lines: it made a surface 20 % slower whenever the compiler placed it so.
-#[repr(align(16))]
+#[repr(C, align(16))]
 pub(super) struct Window {
     /// As in [`Samples`], and the weights as an eleventh number.
     numbers: [[f32; ROOM]; NUMBERS + 1],

@@ -1,11 +1,12 @@
 //! The cubes whose points are parted into patches: so large that a noisy surface is no thicker than one.
 
-use super::patches::{aligned, sort_few};
+use super::patches::aligned;
 use crate::cell::Density;
 use crate::error::Error;
 use crate::grid::{Grid, Placed};
 use crate::lattice::{BRICK, CUBES, Lattice};
 use crate::median::median;
+use crate::order::sort_few;
 use crate::points::{Bounds, Points, spread};
 use crate::progress::Stage;
 use glam::Vec3;

@@ -4,11 +4,11 @@ use super::groups::signed;
 use crate::error::Error;
 use crate::grid::{Grid, Placed};
 use crate::lattice::cube_centre;
+use crate::order::sort_few;
 use crate::parallel::{Filling, concatenated};
 use crate::points::{grow, reserve, starts};
 use crate::progress::Stage;
 use glam::Vec3;
-use std::cmp::Ordering;
 use std::mem::MaybeUninit;
 use std::ops::Range;
 
@@ -204,24 +204,6 @@ pub(super) fn aligned(normal: Vec3, other: Vec3) -> Vec3 {
 fn key(place: Vec3) -> u64 {
     let [x, y, z] = place.to_array().map(|coordinate| u64::from(coordinate.to_bits() >> 10));
     x << 42 | y << 21 | z
-}
-
-/// Sorts what has an order. Most cubes have few points, and for these nothing is faster.
-pub(super) fn sort_few<T: Copy + PartialOrd>(list: &mut [T]) {
-    const FEW: usize = 32;
-    if list.len() > FEW {
-        list.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(Ordering::Equal));
-        return;
-    }
-    for end in 1..list.len() {
-        let one = list[end];
-        let mut place = end;
-        while place > 0 && one < list[place - 1] {
-            list[place] = list[place - 1];
-            place -= 1;
-        }
-        list[place] = one;
-    }
 }
 
 /// How badly a point fits a patch of sums; `None` if it is none of its.
