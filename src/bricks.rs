@@ -5,7 +5,7 @@ use crate::lattice::Lattice;
 use crate::parallel::{self, Filling, Gathering};
 use crate::points::{CHUNK, Points, reserve};
 use crate::progress::Stage;
-use glam::IVec3;
+use glam::{DVec3, IVec3};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// The occupied bricks, numbered from 0; those in a box in layers across its longest axis: so what is near in space is near
@@ -67,6 +67,14 @@ impl Layout {
         (brick - self.first).dot(self.strides) as usize
     }
 
+    /// The same for bricks in whole doubles, which takes less time. The box must have at most 2^32 slots.
+    fn slots(&self) -> impl Fn(DVec3) -> u32 + Sync + use<> {
+        /// With this they stand in the last bits: WebAssembly's own conversion looks at what else a number might be.
+        const BIT: f64 = (1u64 << 52) as f64;
+        let (first, strides) = (self.first.as_dvec3(), self.strides.as_dvec3());
+        move |brick| ((brick - first).dot(strides) + BIT).to_bits() as u32
+    }
+
     fn brick(&self, slot: usize) -> IVec3 {
         self.first + IVec3::splat(slot as i32) / self.strides % self.size
     }
@@ -95,13 +103,12 @@ impl Bricks {
         reserve(&mut bits, count, "the grid")?;
         bits.resize_with(count, AtomicU64::default);
         let keys = Filling::<u32>::new(points.len(), "the sorting keys")?;
-        let (first, strides) = (layout.first.as_dvec3(), layout.strides.as_dvec3());
+        let slot_of = layout.slots();
         stage.run(points.chunks(), &|i| {
             for point in parallel::piece(points.len(), CHUNK, i) {
                 let mut key = OUTSIDE;
                 if let Some(brick) = lattice.brick(points.positions[point]) {
-                    // As [`Layout::slot`] has it.
-                    key = whole((brick - first).dot(strides));
+                    key = slot_of(brick);
                     let slot = key as usize;
                     let (word, bit) = (&bits[slot / 64], 1 << (slot % 64));
                     // Reading first: most points find their bit set, and then no thread waits for another.
@@ -229,13 +236,6 @@ pub(crate) fn set_bits(mut bits: u64) -> impl Iterator<Item = u32> {
         bits &= bits.wrapping_sub(1);
         (bit < 64).then_some(bit)
     })
-}
-
-/// A whole number from 0 to 2^32 - 1 as such: WebAssembly's own conversion looks at what else it might be.
-#[inline(always)]
-fn whole(number: f64) -> u32 {
-    const BIT: f64 = (1u64 << 52) as f64;
-    (number + BIT).to_bits() as u32
 }
 
 /// How many bricks come before a slot.
