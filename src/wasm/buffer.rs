@@ -40,8 +40,8 @@ impl Buffer {
         let byte_length = byte_length as usize;
         let mut floats = Vec::new();
         floats.try_reserve_exact(words).map_err(|_| too_large)?;
-        // SAFETY: within the capacity. The compiler must take them for written, as the pointer leaves for JavaScript, whatever
-        // they are they are floats, and JavaScript writes all of them before Rust reads any.
+        // SAFETY: within the capacity. All bits are floats, and JavaScript, to which the pointer goes, writes them before Rust
+        // reads any.
         unsafe { floats.set_len(words) };
         Ok(Self { storage: Storage::Floats(floats), byte_length })
     }
