@@ -1,5 +1,5 @@
-//! The order of numbers: as whole numbers, for which there is one sort, small and fast in WebAssembly, where the library's is
-//! small and slow.
+//! Sorting, where the library's is small and slow in WebAssembly: numbers as whole numbers, for which there is one sort, and
+//! short lists.
 
 /// The place of a number among all numbers: NaN last, and 0 after -0.
 pub(crate) fn ordinal(number: f64) -> i64 {
