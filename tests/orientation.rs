@@ -233,7 +233,8 @@ fn a_surface_with_one_side_is_not_called_right() {
         let cloud = Cloud { points: moebius(100_000, 16), normals: vec![] }.noisy(noise, 9);
         for how in [Orient::Consistent, Orient::Outward] {
             let result = orient(&cloud.points, how);
-            assert!(components(&result)[0].confidence < 0.2, "{noise}, {how:?}: {:?}", components(&result));
+            // Closed ones have more than 0.5.
+            assert!(components(&result)[0].confidence < 0.25, "{noise}, {how:?}: {:?}", components(&result));
         }
     }
 }

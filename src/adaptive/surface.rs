@@ -48,6 +48,8 @@ pub(super) struct Surface {
     pub width: f32,
     /// Surface variation: the least eigenvalue of the points' covariance, as a share of all three.
     pub variation: f32,
+    /// Variance across it of the points of a sample; zero where each sample is one point.
+    pub within: f32,
     /// How many points it rests on.
     pub points: f32,
     /// Whether more than a plane could be told.
@@ -64,6 +66,7 @@ impl Surface {
         error_growth: 0.0,
         width: 0.0,
         variation: 0.0,
+        within: 0.0,
         points: 0.0,
         is_curved: false,
         lacks_detail: false,
@@ -151,6 +154,7 @@ impl Window {
                 // Lack of fit: the variance of a point, told by the samples' distances and by the spread in each.
                 let between = between * points / (count - 6.0);
                 let own = within * points / (points - count);
+                surface.within = own as f32;
                 surface.lacks_detail = between > own * (1.0 + 3.0 * (2.0 / (count - 6.0)).sqrt()) + DETAIL * DETAIL;
             }
             surface.noise = noise as f32;
@@ -411,6 +415,39 @@ mod tests {
         assert!(!lacks_detail(|x, y| 0.1 * x * x + 0.15 * y * y));
         assert!(!lacks_detail(|x, y| 0.1 * x * x - 0.05 * y * y));
         assert!(lacks_detail(|x, _| 0.1 * x.abs()));
+    }
+
+    /// Inside of samples half an edge wide; `vote.rs` rests on it.
+    #[test]
+    fn noise_is_in_the_samples_and_the_sides_of_a_wall_are_not() {
+        let mut state = 1u32;
+        let mut uniform = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 8_388_608.0 - 1.0
+        };
+        let mut within = |slope: f32, height: &dyn Fn(&mut dyn FnMut() -> f32) -> f32| {
+            let mut octants = std::collections::BTreeMap::<[i32; 3], Vec<Sample>>::new();
+            for _ in 0..4000 {
+                let (x, y) = (1.5 * uniform(), 1.5 * uniform());
+                let place = Vec3::new(x, y, 0.1 + slope * x + height(&mut uniform));
+                if place.abs().max_element() >= 1.5 {
+                    continue;
+                }
+                let octant = (2.0 * place).floor().as_ivec3().to_array();
+                octants.entry(octant).or_default().push(Sample::point(place));
+            }
+            let samples: Vec<Sample> = octants.values().map(|points| Sample::of(points.iter().copied())).collect();
+            window_of(&samples).fit().unwrap().within
+        };
+        for deviation in [0.1, 0.25, 0.4] {
+            // Of a slope, so that it does not lie along the samples.
+            let along_z = deviation * 2f32.sqrt();
+            let found = within(1.0, &|uniform| along_z * (0..12).map(|_| uniform()).sum::<f32>() / 2.0);
+            let expected = 1.0 / (1.0 / (deviation * deviation) + 48.0);
+            assert!((found / expected - 1.0).abs() < 0.15, "{found} instead of {expected}");
+        }
+        let wall = within(0.0, &|uniform| if uniform() < 0.0 { 0.0 } else { 0.5 });
+        assert!(wall < 1e-4, "{wall}");
     }
 
     #[test]

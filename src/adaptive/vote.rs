@@ -5,6 +5,7 @@ use super::around::Around;
 use super::choose::{Chosen, MISFIT};
 use super::level::Level;
 use super::matrix::{dot_lanes, times_lanes};
+use super::surface::Surface;
 use crate::error::Error;
 use crate::grid::Placed;
 use crate::lanes::{inverse_root, load, root, transposed};
@@ -28,8 +29,17 @@ const DISTANCE_FLOOR: f32 = 9e-8;
 /// Where all normals round a cube agree within so many radians, and the sum of their deviations, nothing needs a vote.
 const SMOOTH: f32 = 0.05;
 
+/// So many where noise decides: then the normals differ because of it, but no more than on one surface.
+const SMOOTH_IN_NOISE: f32 = 0.25;
+
 /// Cubes whose surface rests on fewer points are not divided: the surfaces of the halves would rest on a quarter of them.
 const DIVIDED_POINTS: f32 = 60.0;
+
+/// One over the variance of points anywhere in a sample, which is half an edge wide.
+const SAMPLE: f32 = 48.0;
+
+/// The share of what noise leaves inside of samples that tells it.
+const WITHIN: f32 = 0.8;
 
 /// The cubes of a level, and the surfaces they rest on.
 pub(super) struct Vote<'a> {
@@ -89,10 +99,14 @@ impl<'a> Task<'a> {
         let (own, surface) = (&chosen[cube], &level.surfaces[cube]);
         let can_divide = !is_last && surface.points >= DIVIDED_POINTS;
         let mut smooth = None;
-        if own.is_some() && !(can_divide && surface.lacks_detail) {
+        if own.is_some() {
             self.around.near(&level.grid, brick, bit, 1, &mut self.near);
-            self.ballot.invite(&self.near, chosen, f32::INFINITY);
-            smooth = self.ballot.smooth(own.quadric.centre);
+            let is_noisy = self.is_noisy(own, surface);
+            if is_noisy || !(can_divide && surface.lacks_detail) {
+                self.ballot.invite(&self.near, chosen, f32::INFINITY);
+                let tolerance = if is_noisy { SMOOTH_IN_NOISE } else { SMOOTH };
+                smooth = self.ballot.smooth(own.quadric.centre, tolerance);
+            }
         }
         if smooth.is_none() {
             if can_divide {
@@ -131,6 +145,16 @@ impl<'a> Task<'a> {
             self.counts[own.doublings as usize].fetch_add(count, Relaxed);
         }
         true
+    }
+
+    /// Whether noise decides in a cube: it and three quarters of the cubes near it rest on larger neighbourhoods than the
+    /// smallest, and their points lie off the surface within the samples too. The sides of a thin wall are samples of their
+    /// own. Dividing such a cube would only take points away, and the halves would rest on the same surfaces.
+    fn is_noisy(&self, own: &Chosen, surface: &Surface) -> bool {
+        let is_coarse = |&&(_, cube): &&(Vec3, usize)| self.vote.chosen[cube].doublings > 0;
+        let coarse = self.near.iter().filter(is_coarse).count();
+        let within = own.noise / (1.0 + SAMPLE * own.noise);
+        own.doublings > 0 && 4 * coarse >= 3 * self.near.len() && surface.within >= WITHIN * within
     }
 }
 
@@ -301,16 +325,17 @@ impl Ballot {
         Best { weight, normal: Vec3::new(x, y, z), centre: Vec3::new(a, b, c), error }
     }
 
-    /// One linear function for all points of a cube, if about its centroid all voters agree.
+    /// One linear function for all points of a cube, if about its centroid all voters agree within so many radians, and the
+    /// sum of their deviations.
     #[inline(never)]
-    fn smooth(&mut self, centre: Vec3) -> Option<Smooth> {
+    fn smooth(&mut self, centre: Vec3, tolerance: f32) -> Option<Smooth> {
         let best = self.ask(centre);
         if best.weight < f32::MIN_POSITIVE {
             // Far from all of them.
             return None;
         }
         let normal = best.normal.to_array().map(Vec4::splat);
-        let deviation = SMOOTH + best.error.sqrt();
+        let deviation = tolerance + best.error.sqrt();
         let mut sums = [Vec4::ZERO; 9];
         for (votes, voters) in self.votes.iter().zip(&self.voters) {
             let cosine = dot_lanes(normal, votes.normal);
