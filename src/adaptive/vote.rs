@@ -30,7 +30,7 @@ const DISTANCE_FLOOR: f32 = 9e-8;
 const SMOOTH: f32 = 0.05;
 
 /// So many where noise decides: then the normals differ because of it, but no more than on one surface.
-const SMOOTH_IN_NOISE: f32 = 0.25;
+const SMOOTH_IN_NOISE: f32 = 0.12;
 
 /// Cubes whose surface rests on fewer points are not divided: the surfaces of the halves would rest on a quarter of them.
 const DIVIDED_POINTS: f32 = 60.0;
