@@ -354,6 +354,15 @@ mod tests {
         window
     }
 
+    /// Numbers from -1 to 1.
+    fn uniform() -> impl FnMut() -> f32 {
+        let mut state = 1u32;
+        move || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 8_388_608.0 - 1.0
+        }
+    }
+
     fn grid(side: i32) -> impl Iterator<Item = (f32, f32)> {
         (0..side * side).map(move |i| {
             let place = |i: i32| 2.0 * i as f32 / (side - 1) as f32 - 1.0;
@@ -380,11 +389,7 @@ mod tests {
     #[test]
     fn the_variance_of_the_normal_is_told() {
         let (mut claimed, mut made) = (0.0, 0.0);
-        let mut state = 1u32;
-        let mut uniform = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / 8_388_608.0 - 1.0
-        };
+        let mut uniform = uniform();
         for _ in 0..200 {
             // The noise has a deviation of 0.05.
             let noisy = window(grid(7).map(|(x, y)| Vec3::new(x, y, 0.05 * (uniform() + uniform() + uniform()))));
@@ -420,11 +425,7 @@ mod tests {
     /// Inside of samples half an edge wide; `vote.rs` rests on it.
     #[test]
     fn noise_is_in_the_samples_and_the_sides_of_a_wall_are_not() {
-        let mut state = 1u32;
-        let mut uniform = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / 8_388_608.0 - 1.0
-        };
+        let mut uniform = uniform();
         let mut within = |slope: f32, height: &dyn Fn(&mut dyn FnMut() -> f32) -> f32| {
             let mut octants = std::collections::BTreeMap::<[i32; 3], Vec<Sample>>::new();
             for _ in 0..4000 {

@@ -149,7 +149,7 @@ impl<'a> Task<'a> {
 
     /// Whether noise decides in a cube: it and three quarters of the cubes near it rest on larger neighbourhoods than the
     /// smallest, and their points lie off the surface within the samples too. The sides of a thin wall are samples of their
-    /// own. Dividing such a cube would only take points away, and the halves would rest on the same surfaces.
+    /// own. Dividing such a cube would only take points away, and its parts would rest on the same surfaces.
     fn is_noisy(&self, own: &Chosen, surface: &Surface) -> bool {
         let is_coarse = |&&(_, cube): &&(Vec3, usize)| self.vote.chosen[cube].doublings > 0;
         let coarse = self.near.iter().filter(is_coarse).count();
