@@ -140,8 +140,14 @@ impl Level {
     }
 
     /// Gives up what only the smallest cubes need.
-    pub fn release(&mut self) {
-        (self.grid.placed, self.samples) = (Vec::new(), Samples::default());
+    pub fn release_points(&mut self) {
+        self.grid.placed = Vec::new();
+        self.release_samples();
+    }
+
+    /// Gives up what surfaces were fitted to.
+    pub fn release_samples(&mut self) {
+        (self.samples, self.sample_end) = (Samples::default(), Vec::new());
     }
 
     /// Whether the points of a cube are to get their normals here.

@@ -66,7 +66,6 @@ pub(crate) fn normals(
     let origin = lattice.brick_place(middle).unwrap_or(IVec3::ZERO);
     let base = Level::new(points, *lattice, None, &progress.stage("sort", 0.06..0.3))?;
     lap("sort");
-    let normals = Normals::new(points.len(), base.grid.placed.len(), curvature)?;
     let mut levels = vec![base];
     let stage = progress.stage("surfaces", 0.3..0.5);
     for i in 1.. {
@@ -80,15 +79,19 @@ pub(crate) fn normals(
         let coarser = levels[last].coarser(origin >> last as i32, &part.part(0.5..1.0))?;
         levels.push(coarser);
         if last > 0 {
-            levels[last].release();
+            levels[last].release_points();
         }
     }
     // The smallest cubes are the last from here on.
     levels.reverse();
     lap("surfaces");
 
+    let stage = progress.stage("vote", 0.5..0.6);
+    let chosen = choose(&mut levels, &stage.part(0.0..0.4))?;
+    // Not before most of the memory for surfaces is given back.
+    let normals = Normals::new(points.len(), levels[levels.len() - 1].grid.placed.len(), curvature)?;
     let mut run = Run { points, normals: &normals, cubes: 0, surfaces: 0, chosen_by: [0; SIZES] };
-    let (rough, chosen) = run.settle(&levels, 0, &progress.stage("vote", 0.5..0.6))?;
+    let rough = run.settle(&levels, &chosen, 0, &stage.part(0.4..1.0))?;
     let mut noises = Vec::new();
     reserve(&mut noises, chosen.len(), "the surfaces")?;
     noises.extend(chosen.iter().filter(|chosen| chosen.is_some()).map(|chosen| chosen.noise));
@@ -118,12 +121,17 @@ struct Run<'a> {
 
 impl Run<'_> {
     /// Finds the normals of all points in the smallest cubes, the last of the levels, but not in those that are to be
-    /// divided: answers which are, and what was chosen for each.
-    fn settle(&mut self, levels: &[Level], division: usize, stage: &Stage) -> Result<(Vec<bool>, Vec<Chosen>), Error> {
+    /// divided: answers which are.
+    fn settle(
+        &mut self,
+        levels: &[Level],
+        chosen: &[Chosen],
+        division: usize,
+        stage: &Stage,
+    ) -> Result<Vec<bool>, Error> {
         let level = &levels[levels.len() - 1];
-        let chosen = choose(levels, &stage.part(0.0..0.4))?;
-        let vote = Vote { level, chosen: &chosen, is_last: division == DIVISIONS, normals: self.normals };
-        let (rough, counts) = vote.run(&stage.part(0.4..1.0))?;
+        let vote = Vote { level, chosen, is_last: division == DIVISIONS, normals: self.normals };
+        let (rough, counts) = vote.run(stage)?;
         for (_, chosen) in chosen.iter().enumerate().filter(|&(cube, _)| level.is_wanted(cube) && !rough[cube]) {
             self.cubes += 1;
             self.surfaces += u64::from(chosen.is_some());
@@ -131,7 +139,7 @@ impl Run<'_> {
         for (all, count) in self.chosen_by[DIVISIONS - division..].iter_mut().zip(counts) {
             *all += count;
         }
-        Ok((rough, chosen))
+        Ok(rough)
     }
 
     /// Divides the rough ones of the smallest cubes, some at a time, so that a cloud that is rough everywhere takes hardly
@@ -151,7 +159,9 @@ impl Run<'_> {
                 let stage = stage.part(start as f64 / total..end as f64 / total);
                 let finer = level.divided(rough, start..end, self.points, &stage.part(0.0..0.3))?;
                 levels.push(finer);
-                let rough = self.settle(levels, division + 1, &stage.part(0.3..0.5))?.0;
+                let chosen = choose(levels, &stage.part(0.3..0.4))?;
+                let rough = self.settle(levels, &chosen, division + 1, &stage.part(0.4..0.5))?;
+                drop(chosen);
                 self.divide(levels, division + 1, &rough, &stage.part(0.5..1.0))?;
                 levels.pop();
             }
