@@ -7,6 +7,9 @@ import { readFileSync, readdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { Failure, root } from './run.mjs';
 
+/** Bytes of the stack of a thread: as many as that of the worker has. By default it is twice as much. */
+const STACK = 1 << 20;
+
 /** Shortens glue, and the names that it shares with the wasm modules in a folder of dist/. */
 export function shortenGlue(glue, folder) {
   return shortenNames(shortenCode(glue), join(root, folder));
@@ -44,7 +47,7 @@ async function init({ module_or_path: module, memory }) {
   const { exports } = await WebAssembly.instantiate(module, __wbg_get_imports(memory));
   wasmModule = module;
   wasm = exports;
-  wasm.__wbindgen_start();
+  wasm.__wbindgen_start(${STACK});
   return { memory: wasm.memory };
 }
 export { init as default };

@@ -78,7 +78,7 @@ pub struct Scale {
 /// the zero vector and influences no other. The result is the same to the bit for any number of threads.
 ///
 /// [`Method::Bilinear`] is linear in the number of points. Beyond the input it takes about 30 bytes a point with cubes that
-/// hold 4 points or more, up to some 130 when every point has a cube for itself; with [`Cell::Auto`] about 40, up to 85
+/// hold 4 points or more, up to some 130 when every point has a cube for itself; with [`Cell::Auto`] about 35, up to 70
 /// where no surface is smooth. The baselines take n log n time and 30 bytes a point. Signs by [`Orient::Consistent`] and
 /// [`Orient::Outward`] take 32 bytes a point after all that is given back, up to 190 where there is no surface.
 ///
