@@ -3,8 +3,9 @@
 use crate::error::Error;
 use crate::lattice::Lattice;
 use crate::parallel::{self, Filling, Gathering};
-use crate::points::{CHUNK, Points, reserve};
+use crate::points::{CHUNK, reserve};
 use crate::progress::Stage;
+use crate::source::Source;
 use glam::{DVec3, IVec3};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -86,38 +87,36 @@ pub(crate) const OUTSIDE: u32 = u32::MAX;
 impl Bricks {
     /// Finds the bricks of all points, and for each point the key of its brick, [`OUTSIDE`] if it has none. One pass,
     /// parallel, two where the box is nearly empty.
-    pub fn find(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
-        let layout = Layout::of(lattice);
+    pub fn find(source: &Source, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
+        let layout = Layout::of(&source.lattice);
         // At most 3 bytes a point. A surface with a few points in a cube needs a tenth of that.
-        let limit = (16.0 * points.len() as f64).clamp(1e6, 2e9);
-        if layout.volume() <= limit {
-            Self::in_box(points, lattice, layout, stage)
-        } else {
-            Self::in_table(points, lattice, stage)
-        }
+        let limit = (16.0 * source.len() as f64).clamp(1e6, 2e9);
+        if layout.volume() <= limit { Self::in_box(source, layout, stage) } else { Self::in_table(source, stage) }
     }
 
-    fn in_box(points: &Points, lattice: &Lattice, layout: Layout, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
+    fn in_box(source: &Source, layout: Layout, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
         let count = (layout.volume() as usize).div_ceil(64);
         let mut bits: Vec<AtomicU64> = Vec::new();
         reserve(&mut bits, count, "the grid")?;
         bits.resize_with(count, AtomicU64::default);
-        let keys = Filling::<u32>::new(points.len(), "the sorting keys")?;
+        let keys = Filling::<u32>::new(source.len(), "the sorting keys")?;
         let slot_of = layout.slots();
-        stage.run(points.chunks(), &|i| {
-            for point in parallel::piece(points.len(), CHUNK, i) {
-                let mut key = OUTSIDE;
-                if let Some(brick) = lattice.brick(points.positions[point]) {
-                    key = slot_of(brick);
-                    let slot = key as usize;
-                    let (word, bit) = (&bits[slot / 64], 1 << (slot % 64));
-                    // Reading first: most points find their bit set, and then no thread waits for another.
-                    if word.load(Relaxed) & bit == 0 {
-                        word.fetch_or(bit, Relaxed);
+        stage.run(source.chunks(), &|i| {
+            for (lattice, points) in source.parts(parallel::piece(source.len(), CHUNK, i)) {
+                for point in points {
+                    let mut key = OUTSIDE;
+                    if let Some(brick) = lattice.brick(source.positions[point]) {
+                        key = slot_of(brick);
+                        let slot = key as usize;
+                        let (word, bit) = (&bits[slot / 64], 1 << (slot % 64));
+                        // Reading first: most points find their bit set, and then no thread waits for another.
+                        if word.load(Relaxed) & bit == 0 {
+                            word.fetch_or(bit, Relaxed);
+                        }
                     }
+                    // SAFETY: each point belongs to one chunk.
+                    unsafe { keys.write(point, key) };
                 }
-                // SAFETY: each point belongs to one chunk.
-                unsafe { keys.write(point, key) };
             }
         })?;
         // SAFETY: the chunks hold all points.
@@ -140,13 +139,13 @@ impl Bricks {
         Ok((Self { places, index: Index::Box { layout, bits, before } }, keys))
     }
 
-    fn in_table(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
+    fn in_table(source: &Source, stage: &Stage) -> Result<(Self, Vec<u32>), Error> {
         // Sorted below, so the order in which the chunks come does not matter.
         let found = Gathering::new("the grid");
-        stage.part(0.0..0.5).run(points.chunks(), &|i| {
+        stage.part(0.0..0.5).run(source.chunks(), &|i| {
             let mut places = Vec::new();
-            for &point in points.chunk(i) {
-                if let Some(brick) = lattice.brick_place(point) {
+            for (lattice, points) in source.parts(parallel::piece(source.len(), CHUNK, i)) {
+                for brick in source.positions[points].iter().filter_map(|&position| lattice.brick_place(position)) {
                     // Of this width, so that there is one sort of such triples in the module.
                     let place = [brick.z, brick.y, brick.x].map(i64::from);
                     if places.last() != Some(&place) {
@@ -176,12 +175,14 @@ impl Bricks {
         }
 
         let bricks = Self { places, index: Index::Table { slots } };
-        let keys = Filling::new(points.len(), "the sorting keys")?;
-        stage.part(0.5..1.0).run(points.chunks(), &|i| {
-            for point in parallel::piece(points.len(), CHUNK, i) {
-                let number = lattice.brick_place(points.positions[point]).and_then(|brick| bricks.number(brick));
-                // SAFETY: each point belongs to one chunk.
-                unsafe { keys.write(point, number.unwrap_or(OUTSIDE)) };
+        let keys = Filling::new(source.len(), "the sorting keys")?;
+        stage.part(0.5..1.0).run(source.chunks(), &|i| {
+            for (lattice, points) in source.parts(parallel::piece(source.len(), CHUNK, i)) {
+                for point in points {
+                    let number = lattice.brick_place(source.positions[point]).and_then(|brick| bricks.number(brick));
+                    // SAFETY: each point belongs to one chunk.
+                    unsafe { keys.write(point, number.unwrap_or(OUTSIDE)) };
+                }
             }
         })?;
         // SAFETY: the chunks hold all points.

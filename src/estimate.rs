@@ -13,6 +13,7 @@ use crate::options::{Cell, Method, Options, Orient};
 use crate::orient::{Components, orient};
 use crate::points::{Bounds, Bulk, Points};
 use crate::progress::Progress;
+use crate::source::Source;
 
 /// The normals of a cloud, and how they were found.
 #[derive(Clone, Debug, PartialEq)]
@@ -168,7 +169,7 @@ fn adaptive(
     let lattice = Lattice::new(bounds, &|| density.middle, density.edge(cell::POINTS_PER_CELL), adaptive::CUBES);
     laps.end("cellSize");
     let lap = &mut |phase| laps.end(phase);
-    let answer = adaptive::normals(points, &lattice, density.middle.as_vec3(), options.curvature, progress, lap)?;
+    let answer = adaptive::normals(points, &lattice, options.curvature, progress, lap)?;
     let mut report = describe(points, bounds, &lattice, &answer.found, laps);
     report.cells = answer.cubes;
     report.nodes = answer.surfaces;
@@ -186,7 +187,8 @@ fn bilinear(points: &Points, options: &Options, edge: f64, bounds: &Bounds, mut 
     progress.update("cellSize", 0.03)?;
     let lattice = Lattice::new(bounds, &|| Bulk::of_points(points).median, edge, CUBES);
     laps.end("cellSize");
-    let (grid, moments) = Grid::sort(points, &lattice, &progress.stage("sort", 0.06..0.55), nodes::moments)?;
+    let source = Source::new(points, lattice);
+    let (grid, moments) = Grid::sort(&source, &progress.stage("sort", 0.06..0.55), nodes::moments)?;
     laps.end("sort");
     let stage = progress.stage("nodes", 0.55..0.65);
     let (nodes, variations) = nodes::nodes(&grid, &moments, options.curvature, &stage)?;

@@ -2,10 +2,11 @@
 
 use crate::bricks::{Bricks, OUTSIDE, set_bits};
 use crate::error::Error;
-use crate::lattice::{Lattice, cube_centre, octant_in_brick};
+use crate::lattice::{cube_centre, octant_in_brick};
 use crate::parallel::{self, Filling, Scatter};
-use crate::points::{CHUNK, Points, reserve};
+use crate::points::{CHUNK, reserve};
 use crate::progress::Stage;
+use crate::source::Source;
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec3, Vec4};
 use std::ops::Range;
@@ -59,21 +60,20 @@ impl Grid {
     /// Sorts the points into cubes, and asks `of_cube` for something about every cube, from its points and its centre in
     /// the brick. Four passes over the points, each parallel.
     pub fn sort<T: Copy + Send>(
-        points: &Points,
-        lattice: &Lattice,
+        source: &Source,
         stage: &Stage,
         of_cube: impl Fn(&[Placed], Vec3) -> T + Sync,
     ) -> Result<(Self, Vec<T>), Error> {
-        let mut grid = Self::sort_points(points, lattice, &stage.part(0.0..0.9))?;
+        let mut grid = Self::sort_points(source, &stage.part(0.0..0.9))?;
         let answers = grid.find_cubes(&stage.part(0.9..1.0), of_cube)?;
         Ok((grid, answers))
     }
 
     /// All but the ends of the cubes.
     #[optimize(size)]
-    fn sort_points(points: &Points, lattice: &Lattice, stage: &Stage) -> Result<Self, Error> {
-        let (bricks, keys) = Bricks::find(points, lattice, &stage.part(0.0..0.4))?;
-        let (first_point, mut placed) = sort_by_brick(points, lattice, &bricks, keys, &stage.part(0.4..0.8))?;
+    fn sort_points(source: &Source, stage: &Stage) -> Result<Self, Error> {
+        let (bricks, keys) = Bricks::find(source, &stage.part(0.0..0.4))?;
+        let (first_point, mut placed) = sort_by_brick(source, &bricks, keys, &stage.part(0.4..0.8))?;
         let masks = sort_by_cube(&mut placed, &first_point, &stage.part(0.8..1.0))?;
 
         let mut first_cube = Vec::new();
@@ -213,13 +213,12 @@ fn octant_ends(points: &[Placed], centre: Vec3) -> u64 {
 /// Sorts the points by brick: a counting sort, stable, so its result does not depend on how the input is cut.
 #[optimize(size)]
 fn sort_by_brick(
-    points: &Points,
-    lattice: &Lattice,
+    source: &Source,
     bricks: &Bricks,
     mut keys: Vec<u32>,
     stage: &Stage,
 ) -> Result<(Vec<u32>, Vec<Placed>), Error> {
-    let count = points.len();
+    let count = source.len();
     // Each piece of the input counts for itself. Few pieces when there are many bricks: at most 8 bytes a point.
     let pieces = (2 * count / bricks.len().max(1)).clamp(1, (4 * parallel::threads()).max(16));
     let size = count.div_ceil(pieces).max(CHUNK);
@@ -257,14 +256,17 @@ fn sort_by_brick(
     stage.part(0.15..1.0).run(pieces, &|i| {
         // SAFETY: each piece counts on in its own part.
         let next = unsafe { shared.slice(of_piece(i)) };
-        for point in parallel::piece(count, size, i) {
-            let key = keys[point] as usize;
-            if let Some(next) = next.get_mut(key) {
-                let local = lattice.local(points.positions[point]);
-                // SAFETY: `next` runs through the part of this piece and this brick, which the sums above gave to no
-                // other piece and no other brick.
-                unsafe { placed.write(*next as usize, Placed::new(local, point as u32)) };
-                *next += 1;
+        for (lattice, points) in source.parts(parallel::piece(count, size, i)) {
+            for point in points {
+                let key = keys[point] as usize;
+                if let Some(next) = next.get_mut(key) {
+                    let local = lattice.local(source.positions[point]);
+                    let number = source.numbers.map_or(point as u32, |numbers| numbers[point]);
+                    // SAFETY: `next` runs through the part of this piece and this brick, which the sums above gave to no
+                    // other piece and no other brick.
+                    unsafe { placed.write(*next as usize, Placed::new(local, number)) };
+                    *next += 1;
+                }
             }
         }
     })?;

@@ -34,9 +34,9 @@ impl Lattice {
         Self { base, scale, low: DVec3::ZERO, high }
     }
 
-    /// The same cubes, for positions in edges from the lowest corner of brick `origin`.
-    pub fn in_edges(&self, origin: IVec3) -> Self {
-        Self { base: f64::from(-BRICK) * origin.as_dvec3(), scale: 1.0, ..*self }
+    /// The same cubes, for positions that are places in a brick of a grid whose cubes have `edge` edges of these.
+    pub fn for_places_in(&self, brick: IVec3, edge: f64) -> Self {
+        Self { base: f64::from(-BRICK) * brick.as_dvec3(), scale: edge, ..*self }
     }
 
     /// Cubes of twice the edge, eight of these in each.
@@ -59,11 +59,6 @@ impl Lattice {
     /// Cubes along each axis.
     pub fn size(&self) -> DVec3 {
         self.high - self.low
-    }
-
-    /// The point at a place in a brick.
-    pub fn position(&self, brick: IVec3, local: Vec3) -> Vec3 {
-        (self.base + (f64::from(BRICK) * brick.as_dvec3() + local.as_dvec3()) / self.scale).as_vec3()
     }
 
     /// The edge of a cube.

@@ -38,6 +38,7 @@ pub mod ply;
 mod points;
 mod power;
 mod progress;
+mod source;
 mod surroundings;
 #[cfg(target_arch = "wasm32")]
 pub mod wasm;

@@ -99,6 +99,7 @@ mod tests {
     use crate::lattice::{CUBES, Lattice};
     use crate::points::{Bounds, Points};
     use crate::progress::Progress;
+    use crate::source::Source;
     use glam::{DMat3, DVec3, IVec3};
 
     /// Some points on a bumpy surface, some in a volume, in a turned and stretched box.
@@ -122,7 +123,7 @@ mod tests {
             let lattice = Lattice::new(&bounds, &|| DVec3::ZERO, edge, CUBES);
             let progress = Progress::silent();
             let stage = progress.stage("test", 0.0..1.0);
-            let (grid, moments) = Grid::sort(&points, &lattice, &stage, moments).unwrap();
+            let (grid, moments) = Grid::sort(&Source::new(&points, lattice), &stage, moments).unwrap();
             let (nodes, variations) = nodes(&grid, &moments, true, &stage).unwrap();
             let mut variations = variations.unwrap().into_iter();
 

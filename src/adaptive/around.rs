@@ -66,6 +66,7 @@ mod tests {
     use crate::lattice::{CUBES, Lattice, cube_centre};
     use crate::points::{Bounds, Points};
     use crate::progress::Progress;
+    use crate::source::Source;
     use glam::{DVec3, IVec3};
 
     #[test]
@@ -78,7 +79,8 @@ mod tests {
         let bounds = Bounds { min: Vec3::ZERO, max: Vec3::new(3000.0, 3000.0, 700.0), finite: 3000 };
         let lattice = Lattice::new(&bounds, &|| DVec3::ZERO, 120.0, CUBES);
         let progress = Progress::silent();
-        let (grid, _) = Grid::sort(&points, &lattice, &progress.stage("test", 0.0..1.0), |_, _| ()).unwrap();
+        let (grid, _) =
+            Grid::sort(&Source::new(&points, lattice), &progress.stage("test", 0.0..1.0), |_, _| ()).unwrap();
         let all: Vec<(usize, usize, u32, IVec3)> = (0..grid.blocks.len())
             .flat_map(|block| grid.cubes_in(block))
             .map(|(brick, cube, bit)| (brick, cube, bit, 4 * grid.bricks.places[brick] + cube_centre(bit).as_ivec3()))

@@ -7,10 +7,10 @@ use crate::error::Error;
 use crate::grid::{Grid, Placed, octants};
 use crate::lattice::{BRICK, Lattice, cube_centre};
 use crate::parallel::Filling;
-use crate::points::{Points, reserve};
+use crate::points::reserve;
 use crate::progress::Stage;
-use glam::{DVec3, IVec3, Vec3};
-use std::borrow::Cow;
+use crate::source::{Other, Source};
+use glam::{IVec3, Vec3};
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -23,8 +23,6 @@ pub(super) struct Level {
     /// For each cube its last sample, plus one.
     sample_end: Vec<u32>,
     pub surfaces: Vec<Surface>,
-    /// The points' numbers in the input, if they are not the same.
-    names: Option<Vec<u32>>,
     /// The cubes whose points are to get their normals here; if empty, all.
     wanted: Vec<bool>,
 }
@@ -33,14 +31,17 @@ pub(super) struct Level {
 /// the square of it, beyond a corner the cube.
 const NEXT: f32 = 0.7;
 
+/// What errors call the memory of the points on their way into a level.
+const WHAT: &str = "the detail";
+
 impl Level {
     /// Sorts the points; those of each octant of a cube are a sample. `wholes` says what each point stands for, if not
     /// for itself: in edges half as long.
     #[optimize(size)]
     #[inline(never)]
-    pub fn new(points: &Points, lattice: Lattice, wholes: Option<&[Sample]>, stage: &Stage) -> Result<Self, Error> {
+    pub fn new(source: &Source, wholes: Option<&[Sample]>, stage: &Stage) -> Result<Self, Error> {
         let count = |placed: &[Placed], centre: Vec3| octants(placed, centre).count() as u32;
-        let (grid, mut sample_end) = Grid::sort(points, &lattice, &stage.part(0.0..0.9), count)?;
+        let (grid, mut sample_end) = Grid::sort(source, &stage.part(0.0..0.9), count)?;
         let mut total = 0;
         for end in &mut sample_end {
             total += *end;
@@ -61,42 +62,41 @@ impl Level {
         })?;
         // SAFETY: as many as were counted.
         let samples = unsafe { samples.complete() };
-        let (surfaces, names, wanted) = (Vec::new(), None, Vec::new());
-        Ok(Self { lattice, grid, samples, sample_end, surfaces, names, wanted })
+        let (surfaces, wanted) = (Vec::new(), Vec::new());
+        Ok(Self { lattice: source.lattice, grid, samples, sample_end, surfaces, wanted })
     }
 
-    /// Cubes of twice the edge, in which each cube of this level is a sample. Their positions are counted from brick
-    /// `origin`: where single precision is enough, and wherever the cloud lies the same.
+    /// Cubes of twice the edge, in which each cube of this level is a sample.
     #[optimize(size)]
     #[inline(never)]
-    pub fn coarser(&self, origin: IVec3, stage: &Stage) -> Result<Self, Error> {
-        let lattice = self.lattice.in_edges(origin);
-        let what = "the samples";
-        let (positions, wholes) = (Filling::new(self.grid.cubes(), what)?, Filling::new(self.grid.cubes(), what)?);
-        self.grid.each_cube(&stage.part(0.0..0.3), &|brick, cube, bit| {
+    pub fn coarser(&self, stage: &Stage) -> Result<Self, Error> {
+        let grid = &self.grid;
+        let (positions, wholes) = (Filling::new(grid.cubes(), WHAT)?, Filling::new(grid.cubes(), WHAT)?);
+        grid.each_cube(&stage.part(0.0..0.3), &|_, cube, bit| {
             let whole = self.whole(cube);
-            let position = lattice.position(self.grid.bricks.places[brick], cube_centre(bit) + whole.place);
             // SAFETY: once for each cube.
             unsafe {
-                positions.write(cube, position);
+                positions.write(cube, cube_centre(bit) + whole.place);
                 wholes.write(cube, whole);
             }
         })?;
         // SAFETY: these were all cubes.
         let (positions, wholes) = unsafe { (positions.complete(), wholes.complete()) };
-        let points = Points { positions: Cow::Owned(positions), origin: DVec3::ZERO, unit: 1.0 };
-        Self::new(&points, lattice.coarser(), Some(&wholes), &stage.part(0.3..1.0))
+        let other = Other { bricks: &grid.bricks.places, ends: &grid.first_cube[1..], edge: 0.5 };
+        let lattice = self.lattice.coarser();
+        let source = Source { lattice, positions: &positions, numbers: None, other: Some(other) };
+        Self::new(&source, Some(&wholes), &stage.part(0.3..1.0))
     }
 
     /// Cubes of half the edge, with their surfaces, for the points in and round those of a batch that are rough.
     #[optimize(size)]
     #[inline(never)]
-    pub fn divided(&self, rough: &[bool], batch: Range<usize>, points: &Points, stage: &Stage) -> Result<Self, Error> {
+    pub fn divided(&self, rough: &[bool], batch: Range<usize>, stage: &Stage) -> Result<Self, Error> {
         let grid = &self.grid;
         let is_divided = |cube: usize| rough[cube] && batch.contains(&cube);
         let mut is_near: Vec<AtomicBool> = Vec::new();
-        reserve(&mut is_near, self.grid.cubes(), "the cubes")?;
-        is_near.resize_with(self.grid.cubes(), AtomicBool::default);
+        reserve(&mut is_near, grid.cubes(), "the cubes")?;
+        is_near.resize_with(grid.cubes(), AtomicBool::default);
         stage.part(0.0..0.1).run(grid.blocks.len(), &|block| {
             let (mut around, mut near) = (Around::new(), Vec::new());
             for (brick, _, bit) in grid.cubes_in(block).filter(|&(_, cube, _)| is_divided(cube)) {
@@ -104,27 +104,48 @@ impl Level {
                 near.iter().for_each(|&(_, cube)| is_near[cube].store(true, Relaxed));
             }
         })?;
-        let is_near: Vec<bool> = is_near.into_iter().map(AtomicBool::into_inner).collect();
-        let (mut first, mut last, mut count) = (IVec3::MAX, IVec3::MIN, 0);
-        for (place, cubes) in grid.bricks.places.iter().zip(grid.first_cube.windows(2)) {
-            for cube in (cubes[0] as usize..cubes[1] as usize).filter(|&cube| is_near[cube]) {
-                (first, last) = (first.min(*place), last.max(*place));
-                count += self.points(cube).len();
+        let near_of = |brick: usize| {
+            let cubes = grid.first_cube[brick] as usize..grid.first_cube[brick + 1] as usize;
+            cubes.filter(|&cube| is_near[cube].load(Relaxed)).map(|cube| self.points(cube))
+        };
+        let (mut first, mut last) = (IVec3::MAX, IVec3::MIN);
+        let mut ends = Vec::new();
+        reserve(&mut ends, grid.bricks.len() + 1, WHAT)?;
+        let mut end = 0;
+        ends.push(end);
+        for (brick, &place) in grid.bricks.places.iter().enumerate() {
+            let start = end;
+            near_of(brick).for_each(|points| end += points.len() as u32);
+            if end > start {
+                (first, last) = (first.min(place), last.max(place));
             }
+            ends.push(end);
         }
-        let (mut names, mut positions) = (Vec::new(), Vec::new());
-        reserve(&mut names, count, "the detail")?;
-        reserve(&mut positions, count, "the detail")?;
-        for placed in (0..self.grid.cubes()).filter(|&cube| is_near[cube]).flat_map(|cube| self.points(cube)) {
-            let name = self.name(placed);
-            names.push(name);
-            positions.push(points.positions[name as usize]);
-        }
+        let (positions, numbers) = (Filling::new(end as usize, WHAT)?, Filling::new(end as usize, WHAT)?);
+        stage.part(0.1..0.2).run(grid.blocks.len(), &|block| {
+            for brick in grid.blocks[block].clone() {
+                let mut i = ends[brick] as usize;
+                near_of(brick).for_each(|points| {
+                    for point in points {
+                        // SAFETY: a brick belongs to one block, and these points to one brick.
+                        unsafe {
+                            positions.write(i, point.local);
+                            numbers.write(i, point.point);
+                        }
+                        i += 1;
+                    }
+                });
+            }
+        })?;
         drop(is_near);
 
-        let points = Points { positions: Cow::Owned(positions), origin: DVec3::ZERO, unit: 1.0 };
+        // SAFETY: the blocks hold all bricks, and these all points that were counted.
+        let (positions, numbers) = unsafe { (positions.complete(), numbers.complete()) };
+        let other = Other { bricks: &grid.bricks.places, ends: &ends[1..], edge: 2.0 };
         let lattice = self.lattice.finer().part(2 * first, 2 * last + 1);
-        let mut level = Self::new(&points, lattice, None, &stage.part(0.1..0.5))?;
+        let source = Source { lattice, positions: &positions, numbers: Some(&numbers), other: Some(other) };
+        let mut level = Self::new(&source, None, &stage.part(0.2..0.5))?;
+        drop((positions, numbers, ends));
         level.fit(&stage.part(0.5..0.9))?;
         let wanted = Filling::new(level.grid.cubes(), "the cubes")?;
         level.grid.each_cube(&stage.part(0.9..1.0), &|brick, cube, bit| {
@@ -135,7 +156,6 @@ impl Level {
         })?;
         // SAFETY: these were all cubes.
         level.wanted = unsafe { wanted.complete() };
-        level.names = Some(names);
         Ok(level)
     }
 
@@ -158,11 +178,6 @@ impl Level {
     /// The points of a cube.
     pub fn points(&self, cube: usize) -> &[Placed] {
         &self.grid.placed[range(&self.grid.cube_end, cube)]
-    }
-
-    /// A point's number in the input.
-    pub fn name(&self, placed: &Placed) -> u32 {
-        self.names.as_ref().map_or(placed.point, |names| names[placed.point as usize])
     }
 
     /// The sample that stands for a cube.

@@ -19,8 +19,8 @@ use crate::median::median;
 use crate::normals::{Found, Normals};
 use crate::points::{Points, reserve};
 use crate::progress::{Progress, Stage};
+use crate::source::Source;
 use choose::{Chosen, choose};
-use glam::{IVec3, Vec3};
 use level::Level;
 use std::ops::Range;
 use vote::Vote;
@@ -51,20 +51,18 @@ const _: () = assert!(CUBES == (2 << DOUBLINGS) as f64);
 /// Sizes of cubes in all.
 const SIZES: usize = DIVISIONS + DOUBLINGS + 1;
 
-/// Finds the normals of all points on cubes of `lattice`; `middle` is where most points are. Calls `lap` at the end of
+/// Finds the normals of all points on cubes of `lattice`. Calls `lap` at the end of
 /// each phase. In time linear in the points; what is divided to the end takes some ten times as long as what is smooth.
 #[optimize(size)]
 #[inline(never)]
 pub(crate) fn normals(
     points: &Points,
     lattice: &Lattice,
-    middle: Vec3,
     curvature: bool,
     progress: &Progress,
     lap: &mut dyn FnMut(&'static str),
 ) -> Result<Adaptive, Error> {
-    let origin = lattice.brick_place(middle).unwrap_or(IVec3::ZERO);
-    let base = Level::new(points, *lattice, None, &progress.stage("sort", 0.06..0.3))?;
+    let base = Level::new(&Source::new(points, *lattice), None, &progress.stage("sort", 0.06..0.3))?;
     lap("sort");
     let mut levels = vec![base];
     let stage = progress.stage("surfaces", 0.3..0.5);
@@ -76,7 +74,7 @@ pub(crate) fn normals(
         if levels[last].lattice.size().max_element() <= 2.0 {
             break;
         }
-        let coarser = levels[last].coarser(origin >> last as i32, &part.part(0.5..1.0))?;
+        let coarser = levels[last].coarser(&part.part(0.5..1.0))?;
         levels.push(coarser);
         if last > 0 {
             levels[last].release_points();
@@ -157,7 +155,7 @@ impl Run<'_> {
             if points > 0 {
                 let total = rough.len() as f64;
                 let stage = stage.part(start as f64 / total..end as f64 / total);
-                let finer = level.divided(rough, start..end, self.points, &stage.part(0.0..0.3))?;
+                let finer = level.divided(rough, start..end, &stage.part(0.0..0.3))?;
                 levels.push(finer);
                 let chosen = choose(levels, &stage.part(0.3..0.4))?;
                 let rough = self.settle(levels, &chosen, division + 1, &stage.part(0.4..0.5))?;

@@ -120,21 +120,20 @@ impl<'a> Task<'a> {
         let centre = cube_centre(bit);
         if let Some(smooth) = &smooth {
             for four in placed.chunks(4) {
-                let name = |i: usize| f32::from_bits(level.name(&four[i.min(four.len() - 1)]));
-                let names = Vec4::new(name(0), name(1), name(2), name(3));
+                let (directions, points) = smooth.directions(four, centre);
                 // SAFETY: every point of the input stands in one cube that is wanted and not divided.
-                unsafe { self.writer.write_lanes(names, four.len(), smooth.directions(four, centre)) };
+                unsafe { self.writer.write_lanes(points, four.len(), directions) };
             }
         } else {
             for p in placed {
                 // SAFETY: as above.
-                unsafe { self.writer.write(level.name(p), self.ballot.vote(p.local - centre)) };
+                unsafe { self.writer.write(p.point, self.ballot.vote(p.local - centre)) };
             }
         }
         if self.writer.has_curvature() {
             for p in placed {
                 // SAFETY: as above.
-                unsafe { self.writer.write_curvature(level.name(p), own.variation) };
+                unsafe { self.writer.write_curvature(p.point, own.variation) };
             }
         }
         let count = placed.len() as u64;
@@ -197,14 +196,13 @@ struct Smooth {
 }
 
 impl Smooth {
-    /// The directions of the normals of up to four points.
+    /// The directions of the normals of up to four points, and the bits of their numbers.
     #[inline(never)]
-    fn directions(&self, points: &[Placed], cube: Vec3) -> [Vec4; 3] {
-        let centre = (self.centre + cube).extend(0.0);
-        let [x, y, z, _] = transposed(std::array::from_fn(|i| points[i.min(points.len() - 1)].lanes() - centre));
-        let places = [x, y, z];
-        let turns = times_lanes(self.turn, places);
-        std::array::from_fn(|axis| self.normal[axis] + turns[axis])
+    fn directions(&self, points: &[Placed], cube: Vec3) -> ([Vec4; 3], Vec4) {
+        let centre = self.centre + cube;
+        let [x, y, z, numbers] = transposed(std::array::from_fn(|i| points[i.min(points.len() - 1)].lanes()));
+        let turns = times_lanes(self.turn, [x - centre.x, y - centre.y, z - centre.z]);
+        (std::array::from_fn(|axis| self.normal[axis] + turns[axis]), numbers)
     }
 }
 

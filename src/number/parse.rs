@@ -110,6 +110,7 @@ pub(super) fn is_between_singles(value: f64) -> bool {
 
 /// The same by the quotient of two whole numbers, whatever their length. `exponent` belongs to the last digit.
 #[cold]
+#[optimize(size)]
 #[inline(never)]
 fn long_way(digits: &[u8], mut exponent: i64, precision: Precision) -> f64 {
     let (mut top, mut count, mut more) = (Big::new(0), 0, false);

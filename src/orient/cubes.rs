@@ -9,6 +9,7 @@ use crate::median::median;
 use crate::order::sort_few;
 use crate::points::{Bounds, Points, spread};
 use crate::progress::Stage;
+use crate::source::Source;
 use glam::Vec3;
 
 /// Points in a cube: as many as tell noise from a wall.
@@ -29,7 +30,7 @@ pub(super) fn sort(
 ) -> Result<(Grid, f32), Error> {
     let sort = |edge: f64, stage: &Stage| {
         let lattice = Lattice::new(bounds, &|| density.middle, edge, CUBES);
-        Ok(Grid::sort(points, &lattice, stage, |_, _| ())?.0)
+        Ok(Grid::sort(&Source::new(points, lattice), stage, |_, _| ())?.0)
     };
     let edge = density.edge(POINTS_PER_CELL);
     let grid = sort(edge, &stage.part(0.0..0.5))?;

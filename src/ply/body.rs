@@ -183,6 +183,7 @@ impl<'a> Body<'a> {
     }
 
     /// The rows of an element, in their order; none if they have no properties.
+    #[optimize(size)]
     pub fn parts(&self, index: usize) -> Vec<Part<'a>> {
         let element = &self.header.elements[index];
         let start = self.starts[index];

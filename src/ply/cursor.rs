@@ -211,6 +211,7 @@ impl<'a> Cursor<'a> {
 
     /// Why the text that was wanted here is not to be had: the line ended, or something else is in its place.
     #[cold]
+    #[optimize(size)]
     #[inline(never)]
     fn complain(&self, element: &Element) -> Error {
         let mut ahead = self.clone();
@@ -222,6 +223,7 @@ impl<'a> Cursor<'a> {
     }
 
     #[cold]
+    #[optimize(size)]
     #[inline(never)]
     fn miscounted(&self, element: &Element) -> Error {
         let mut row = Cursor { at: self.row, ..self.clone() };

@@ -33,7 +33,10 @@ pub fn estimate(
     if let Some(curvature) = curvature {
         set(&estimation, "curvature", Buffer::from(curvature));
     }
-    if let Some(components) = components {
+    // Only the module with everything finds components, here and below; the other need not know how they are told.
+    if cfg!(feature = "full")
+        && let Some(components) = components
+    {
         // Four bytes are four bytes.
         set(&estimation, "components", Buffer::from(bytemuck::cast_vec::<u32, f32>(components)));
     }
@@ -64,7 +67,9 @@ fn describe(report: &Report) -> Object {
         set(&object, "scales", scales);
     }
     set(&object, "nodesUsed", array(&report.nodes_used));
-    if let Some(components) = &report.components {
+    if cfg!(feature = "full")
+        && let Some(components) = &report.components
+    {
         let list = Array::new();
         for component in &components.largest {
             let object = Object::new();

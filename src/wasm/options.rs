@@ -14,6 +14,7 @@ const ORIENTS: &str = "'none', 'consistent', 'outward', { viewpoint: [x, y, z] }
 /// Reads the options; what is left out or `undefined` keeps its default. Ranges are the estimator's to check.
 ///
 /// The core is asked only for what all have in common (`estimator.ts`).
+#[optimize(size)]
 pub(super) fn parse(value: &JsValue) -> Result<Options, Error> {
     let mut options = Options::default();
     if value.is_undefined() {
@@ -100,6 +101,7 @@ fn three(value: &JsValue) -> Option<[f64; 3]> {
 }
 
 #[cold]
+#[optimize(size)]
 fn refusal(name: &str, value: &JsValue, wanted: &str) -> Error {
     Error::Input(format!("{name} is {}; wanted {wanted}", describe(value)))
 }

@@ -9,6 +9,7 @@ use wasm_bindgen::prelude::*;
 /// Reads a PLY file of at most `maxPoints` points. Consumes the buffer.
 ///
 /// Answers with a point cloud as the package hands it out, but with buffers in place of its arrays.
+#[optimize(size)]
 #[wasm_bindgen(js_name = readPly, unchecked_return_type = "object")]
 pub fn read_ply(
     file: Buffer,
