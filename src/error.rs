@@ -58,7 +58,7 @@ impl Error {
     #[inline(never)]
     pub(crate) fn memory(what: &str, needed: u64) -> Self {
         Self::Limit {
-            message: format!("{what} does not fit into memory; use fewer points, or a 64-bit native build"),
+            message: format!("no memory for {what}; use fewer points, or a 64-bit native build"),
             needed,
             available: None,
         }
@@ -66,6 +66,7 @@ impl Error {
 }
 
 impl fmt::Display for Error {
+    #[optimize(size)]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Format { message, place: None } => f.write_str(message),

@@ -79,15 +79,27 @@ pub struct Scale {
 /// the zero vector and influences no other. The result is the same to the bit for any number of threads.
 ///
 /// [`Method::Bilinear`] is linear in the number of points. Beyond the input it takes about 30 bytes a point with cubes that
-/// hold 4 points or more, up to some 130 when every point has a cube for itself; with [`Cell::Auto`] about 35, up to 70
+/// hold 4 points or more, up to some 130 when every point has a cube for itself; with [`Cell::Auto`] about 40, up to 70
 /// where no surface is smooth. The baselines take n log n time and 30 bytes a point. Signs by [`Orient::Consistent`] and
 /// [`Orient::Outward`] take 32 bytes a point after all that is given back, up to 190 where there is no surface.
 ///
 /// # Errors
 /// [`Error::Input`] and [`Error::Unsupported`] for the options, [`Error::Limit`] when memory does not suffice,
 /// [`Error::Cancelled`] when `progress` asked for it.
-#[optimize(size)]
 pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Result<Estimate, Error> {
+    run(points.borrowed(), options, progress)
+}
+
+/// The same, but gives the positions up when they are sorted, unless signs need them: 12 bytes a point less.
+///
+/// # Errors
+/// As [`estimate`].
+pub fn estimate_owned(points: Points, options: &Options, progress: &Progress) -> Result<Estimate, Error> {
+    run(points, options, progress)
+}
+
+#[optimize(size)]
+fn run(points: Points, options: &Options, progress: &Progress) -> Result<Estimate, Error> {
     options.validate()?;
     // Places and counts are 32-bit numbers.
     if points.len() >= u32::MAX as usize {
@@ -103,36 +115,47 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     let mut laps = Laps::start(&first);
 
     first.update("bounds", 0.0)?;
-    let bounds = Bounds::of(points);
+    let cloud = Cloud { count: points.len(), unit: points.unit, bounds: Bounds::of(&points) };
     laps.end("bounds");
 
-    let density = || {
+    let density = |points: &Points| {
         first.update("cellSize", 0.03)?;
-        Density::of(points, &bounds)
+        Density::of(points, &cloud.bounds)
     };
     if !cfg!(feature = "full") {
-        return adaptive(points, options, &bounds, &density()?, laps);
+        let density = density(&points)?;
+        return adaptive(points, &cloud, options, &density, laps);
     }
+    // Those that signs need are borrowed, others given away.
+    let kept;
+    let (points, needed) = if options.orient.needs_positions() {
+        kept = points;
+        (kept.borrowed(), Some(&kept))
+    } else {
+        (points, None)
+    };
     let mut known = None;
     let mut estimate = match (options.method, options.cell) {
-        (Method::Bilinear, Cell::Auto) => adaptive(points, options, &bounds, known.insert(density()?), laps),
-        (Method::Bilinear, Cell::Scale(scale)) => {
-            bilinear(points, options, scale * cell::paper_edge(bounds.extent(), bounds.finite), &bounds, laps)
+        (Method::Bilinear, Cell::Auto) => {
+            let density = known.insert(density(&points)?);
+            adaptive(points, &cloud, options, density, laps)
         }
+        (Method::Bilinear, Cell::Scale(scale)) => bilinear(points, &cloud, options, scale * cloud.paper_edge(), laps),
         (Method::Bilinear, Cell::Size(size)) => {
-            bilinear(points, options, cell::edge_of_size(size, points.unit)?, &bounds, laps)
+            bilinear(points, &cloud, options, cell::edge_of_size(size, cloud.unit)?, laps)
         }
         (Method::Knn, _) => {
-            baseline(points, options, Baseline::Knn { k: options.k.unwrap_or(16) as usize }, &bounds, laps)
+            baseline(points, &cloud, options, Baseline::Knn { k: options.k.unwrap_or(16) as usize }, laps)
         }
         (Method::Egg, _) => {
-            baseline(points, options, Baseline::Egg { k: options.k.unwrap_or(8) as usize }, &bounds, laps)
+            baseline(points, &cloud, options, Baseline::Egg { k: options.k.unwrap_or(8) as usize }, laps)
         }
     }?;
     if options.orient != Orient::None {
         let mut laps = Laps::start(progress);
         let normals = bytemuck::cast_slice_mut(&mut estimate.normals);
-        let surfaces = orient(points, normals, &bounds, known, options, &progress.stage("orientation", share..1.0))?;
+        let stage = progress.stage("orientation", share..1.0);
+        let surfaces = orient(needed, normals, &cloud.bounds, known, options, &stage)?;
         if let Some(surfaces) = surfaces {
             estimate.components = surfaces.of_point;
             estimate.report.components = Some(surfaces.components);
@@ -143,15 +166,30 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     Ok(estimate)
 }
 
+/// What is known of a cloud without its positions.
+struct Cloud {
+    count: usize,
+    /// A unit of the positions, in units of the input.
+    unit: f64,
+    bounds: Bounds,
+}
+
+impl Cloud {
+    /// The paper's L.
+    fn paper_edge(&self) -> f64 {
+        cell::paper_edge(self.bounds.extent(), self.bounds.finite)
+    }
+}
+
 /// What both kinds of cells have to tell; the rest is left at its default.
-fn describe(points: &Points, bounds: &Bounds, lattice: &Lattice, found: &Found, laps: Laps) -> Report {
+fn describe(cloud: &Cloud, lattice: &Lattice, found: &Found, laps: Laps) -> Report {
     let edge = lattice.edge();
     Report {
-        points: points.len() as u64,
-        unresolved: points.len() as u64 - found.resolved,
+        points: cloud.count as u64,
+        unresolved: cloud.count as u64 - found.resolved,
         grid: lattice.size().as_u64vec3().to_array(),
-        cell_size: edge * points.unit,
-        scale: edge / cell::paper_edge(bounds.extent(), bounds.finite),
+        cell_size: edge * cloud.unit,
+        scale: edge / cloud.paper_edge(),
         milliseconds: laps.ended,
         ..Report::default()
     }
@@ -159,18 +197,18 @@ fn describe(points: &Points, bounds: &Bounds, lattice: &Lattice, found: &Found, 
 
 /// Cubes of the sizes that the cloud asks for.
 fn adaptive(
-    points: &Points,
+    points: Points,
+    cloud: &Cloud,
     options: &Options,
-    bounds: &Bounds,
     density: &Density,
     mut laps: Laps,
 ) -> Result<Estimate, Error> {
     let progress = laps.progress;
-    let lattice = Lattice::new(bounds, &|| density.middle, density.edge(cell::POINTS_PER_CELL), adaptive::CUBES);
+    let lattice = Lattice::new(&cloud.bounds, &|| density.middle, density.edge(cell::POINTS_PER_CELL), adaptive::CUBES);
     laps.end("cellSize");
     let lap = &mut |phase| laps.end(phase);
     let answer = adaptive::normals(points, &lattice, options.curvature, progress, lap)?;
-    let mut report = describe(points, bounds, &lattice, &answer.found, laps);
+    let mut report = describe(cloud, &lattice, &answer.found, laps);
     report.cells = answer.cubes;
     report.nodes = answer.surfaces;
     report.noise = Some(answer.noise * report.cell_size);
@@ -182,23 +220,24 @@ fn adaptive(
 }
 
 /// Cubes of one size: the paper's method.
-fn bilinear(points: &Points, options: &Options, edge: f64, bounds: &Bounds, mut laps: Laps) -> Result<Estimate, Error> {
+fn bilinear(points: Points, cloud: &Cloud, options: &Options, edge: f64, mut laps: Laps) -> Result<Estimate, Error> {
     let progress = laps.progress;
     progress.update("cellSize", 0.03)?;
-    let lattice = Lattice::new(bounds, &|| Bulk::of_points(points).median, edge, CUBES);
+    let lattice = Lattice::new(&cloud.bounds, &|| Bulk::of_points(&points).median, edge, CUBES);
     laps.end("cellSize");
-    let source = Source::new(points, lattice);
+    let source = Source::new(&points, lattice);
     let (grid, moments) = Grid::sort(&source, &progress.stage("sort", 0.06..0.55), nodes::moments)?;
+    drop(points);
     laps.end("sort");
     let stage = progress.stage("nodes", 0.55..0.65);
     let (nodes, variations) = nodes::nodes(&grid, &moments, options.curvature, &stage)?;
     drop(moments);
     laps.end("nodes");
     let stage = progress.stage("interpolation", 0.65..1.0);
-    let (found, nodes_used) = bilinear::interpolate(&grid, &nodes, variations.as_deref(), points.len(), &stage)?;
+    let (found, nodes_used) = bilinear::interpolate(&grid, &nodes, variations.as_deref(), cloud.count, &stage)?;
     laps.end("interpolation");
 
-    let mut report = describe(points, bounds, &lattice, &found, laps);
+    let mut report = describe(cloud, &lattice, &found, laps);
     report.cells = grid.cubes() as u64;
     report.nodes = nodes.iter().filter(|node| Node::is_good(node)).count() as u64;
     report.nodes_used = nodes_used;
@@ -207,19 +246,20 @@ fn bilinear(points: &Points, options: &Options, edge: f64, bounds: &Bounds, mut 
 
 /// The methods it is compared with.
 fn baseline(
-    points: &Points,
+    points: Points,
+    cloud: &Cloud,
     options: &Options,
     baseline: Baseline,
-    bounds: &Bounds,
     mut laps: Laps,
 ) -> Result<Estimate, Error> {
     let progress = laps.progress;
-    let tree = Tree::build(points, bounds, &progress.stage("tree", 0.03..0.2))?;
+    let tree = Tree::build(&points, &cloud.bounds, &progress.stage("tree", 0.03..0.2))?;
+    drop(points);
     laps.end("tree");
     let stage = progress.stage("normals", 0.2..1.0);
-    let found = baseline::normals(&tree, baseline, options.curvature, points.len(), &stage)?;
+    let found = baseline::normals(&tree, baseline, options.curvature, cloud.count, &stage)?;
     laps.end("normals");
-    let count = points.len() as u64;
+    let count = cloud.count as u64;
     let report = Report {
         points: count,
         unresolved: count - found.resolved,

@@ -44,7 +44,7 @@ mod surroundings;
 pub mod wasm;
 
 pub use error::{Error, Place};
-pub use estimate::{Estimate, Report, Scale, estimate};
+pub use estimate::{Estimate, Report, Scale, estimate, estimate_owned};
 pub use options::{Cell, Method, Options, Orient};
 pub use orient::{Component, Components, Side};
 pub use points::Points;

@@ -74,6 +74,13 @@ pub enum Orient {
     Up([f64; 3]),
 }
 
+impl Orient {
+    /// Whether signs depend on where the points are.
+    pub(crate) fn needs_positions(self) -> bool {
+        !matches!(self, Self::None | Self::Up(_))
+    }
+}
+
 impl Options {
     /// Refuses values out of range, and without the feature `full` what this build does not offer.
     pub fn validate(&self) -> Result<(), Error> {

@@ -32,6 +32,13 @@ impl<'a> Points<'a> {
         Ok(Self { positions: Cow::Borrowed(cast_slice(coordinates)), origin: DVec3::ZERO, unit: 1.0 })
     }
 
+    /// The same for a list that is given up with the points. Copied only if it has room for more.
+    pub fn from_vec(coordinates: Vec<f32>) -> Result<Points<'static>, Error> {
+        check_length(coordinates.len())?;
+        let positions = bytemuck::cast_slice_box(coordinates.into_boxed_slice()).into_vec();
+        Ok(Points { positions: Cow::Owned(positions), origin: DVec3::ZERO, unit: 1.0 })
+    }
+
     /// Subtracts an origin near the bulk of the points, then rounds: 12 bytes a point of memory, one pass.
     pub fn from_f64(coordinates: &[f64]) -> Result<Points<'static>, Error> {
         check_length(coordinates.len())?;
@@ -48,6 +55,11 @@ impl<'a> Points<'a> {
     /// What the positions are relative to, in the coordinates of the input.
     pub fn origin(&self) -> [f64; 3] {
         self.origin.to_array()
+    }
+
+    /// The same, without the memory.
+    pub(crate) fn borrowed(&self) -> Points<'_> {
+        Points { positions: Cow::Borrowed(&self.positions), ..*self }
     }
 
     /// The number of points.
@@ -71,6 +83,7 @@ impl<'a> Points<'a> {
     }
 }
 
+#[inline(never)]
 fn check_length(length: usize) -> Result<(), Error> {
     if length.is_multiple_of(3) {
         return Ok(());

@@ -3,7 +3,7 @@
 
 mod common;
 
-use bilinormal::{Cell, Error, Estimate, Method, Options, Orient, Points, Progress, estimate};
+use bilinormal::{Cell, Error, Estimate, Method, Options, Orient, Points, Progress, estimate, estimate_owned};
 use common::*;
 use std::cell::RefCell;
 use std::ops::ControlFlow;
@@ -352,6 +352,22 @@ fn a_stray_point_changes_nothing_noticeable() {
         // What is left of the error on a smooth surface grows with more than the square of the cubes.
         assert!((a / b - 1.0).abs() < 0.15, "{stray:?}: {a} against {b} degrees");
         assert_eq!(with.report.unresolved, lost);
+    }
+}
+
+/// Also if the list has room for more, which is given back first.
+#[test]
+fn points_given_away_get_the_same_normals() {
+    let cloud = cube(20_000, 17).points;
+    let orients = [Orient::None, Orient::Consistent, Orient::Viewpoint([3.0, 2.0, 1.0]), Orient::Up([0.0, 1.0, 1.0])];
+    for options in every_method() {
+        for orient in orients {
+            let options = Options { orient, ..options.clone() };
+            let mut owned = cloud.clone();
+            owned.reserve_exact(2);
+            let given = estimate_owned(Points::from_vec(owned).unwrap(), &options, &Progress::silent()).unwrap();
+            assert_eq!(given, estimate_f32(&cloud, &options), "{options:?}");
+        }
     }
 }
 

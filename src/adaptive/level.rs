@@ -35,21 +35,29 @@ const NEXT: f32 = 0.7;
 const WHAT: &str = "the detail";
 
 impl Level {
-    /// Sorts the points; those of each octant of a cube are a sample. `wholes` says what each point stands for, if not
-    /// for itself: in edges half as long.
+    /// Sorts the points, and counts the samples of each cube: the points of an octant are one.
     #[optimize(size)]
     #[inline(never)]
-    pub fn new(source: &Source, wholes: Option<&[Sample]>, stage: &Stage) -> Result<Self, Error> {
+    pub fn new(source: &Source, stage: &Stage) -> Result<Self, Error> {
         let count = |placed: &[Placed], centre: Vec3| octants(placed, centre).count() as u32;
-        let (grid, mut sample_end) = Grid::sort(source, &stage.part(0.0..0.9), count)?;
+        let (grid, mut sample_end) = Grid::sort(source, stage, count)?;
         let mut total = 0;
         for end in &mut sample_end {
             total += *end;
             *end = total;
         }
-        let samples = Writing::new(total as usize)?;
-        grid.each_cube(&stage.part(0.9..1.0), &|_, cube, bit| {
-            let start = range(&sample_end, cube).start;
+        let (samples, surfaces, wanted) = (Samples::default(), Vec::new(), Vec::new());
+        Ok(Self { lattice: source.lattice, grid, samples, sample_end, surfaces, wanted })
+    }
+
+    /// Makes the samples. `wholes` says what each point stands for, if not for itself: in edges half as long.
+    #[optimize(size)]
+    #[inline(never)]
+    pub fn sample(&mut self, wholes: Option<&[Sample]>, stage: &Stage) -> Result<(), Error> {
+        let (grid, sample_end) = (&self.grid, &self.sample_end);
+        let samples = Writing::new(sample_end.last().map_or(0, |&end| end as usize))?;
+        grid.each_cube(stage, &|_, cube, bit| {
+            let start = range(sample_end, cube).start;
             let centre = cube_centre(bit);
             for (i, (_, octant)) in octants(&grid.placed[range(&grid.cube_end, cube)], centre).enumerate() {
                 let sample = |p: &Placed| match wholes {
@@ -61,9 +69,8 @@ impl Level {
             }
         })?;
         // SAFETY: as many as were counted.
-        let samples = unsafe { samples.complete() };
-        let (surfaces, wanted) = (Vec::new(), Vec::new());
-        Ok(Self { lattice: source.lattice, grid, samples, sample_end, surfaces, wanted })
+        self.samples = unsafe { samples.complete() };
+        Ok(())
     }
 
     /// Cubes of twice the edge, in which each cube of this level is a sample.
@@ -85,7 +92,10 @@ impl Level {
         let other = Other { bricks: &grid.bricks.places, ends: &grid.first_cube[1..], edge: 0.5 };
         let lattice = self.lattice.coarser();
         let source = Source { lattice, positions: &positions, numbers: None, other: Some(other) };
-        Self::new(&source, Some(&wholes), &stage.part(0.3..1.0))
+        let mut level = Self::new(&source, &stage.part(0.3..0.9))?;
+        drop(positions);
+        level.sample(Some(&wholes), &stage.part(0.9..1.0))?;
+        Ok(level)
     }
 
     /// Cubes of half the edge, with their surfaces, for the points in and round those of a batch that are rough.
@@ -144,8 +154,9 @@ impl Level {
         let other = Other { bricks: &grid.bricks.places, ends: &ends[1..], edge: 2.0 };
         let lattice = self.lattice.finer().part(2 * first, 2 * last + 1);
         let source = Source { lattice, positions: &positions, numbers: Some(&numbers), other: Some(other) };
-        let mut level = Self::new(&source, None, &stage.part(0.2..0.5))?;
+        let mut level = Self::new(&source, &stage.part(0.2..0.45))?;
         drop((positions, numbers, ends));
+        level.sample(None, &stage.part(0.45..0.5))?;
         level.fit(&stage.part(0.5..0.9))?;
         let wanted = Filling::new(level.grid.cubes(), "the cubes")?;
         level.grid.each_cube(&stage.part(0.9..1.0), &|brick, cube, bit| {

@@ -51,18 +51,22 @@ const _: () = assert!(CUBES == (2 << DOUBLINGS) as f64);
 /// Sizes of cubes in all.
 const SIZES: usize = DIVISIONS + DOUBLINGS + 1;
 
-/// Finds the normals of all points on cubes of `lattice`. Calls `lap` at the end of
-/// each phase. In time linear in the points; what is divided to the end takes some ten times as long as what is smooth.
+/// Finds the normals of all points on cubes of `lattice`. Calls `lap` at the end of each phase. In time linear in the points; what is divided to the end takes some ten times as long as what is smooth.
 #[optimize(size)]
 #[inline(never)]
 pub(crate) fn normals(
-    points: &Points,
+    points: Points,
     lattice: &Lattice,
     curvature: bool,
     progress: &Progress,
     lap: &mut dyn FnMut(&'static str),
 ) -> Result<Adaptive, Error> {
-    let base = Level::new(&Source::new(points, *lattice), None, &progress.stage("sort", 0.06..0.3))?;
+    let mut base = Level::new(&Source::new(&points, *lattice), &progress.stage("sort", 0.06..0.28))?;
+    let count = points.len();
+    drop(points);
+    // At once, to have the memory of the positions, in which there would be room for nothing else as large.
+    let normals = Normals::new(count, base.grid.placed.len(), curvature)?;
+    base.sample(None, &progress.stage("sort", 0.28..0.3))?;
     lap("sort");
     let mut levels = vec![base];
     let stage = progress.stage("surfaces", 0.3..0.5);
@@ -86,9 +90,7 @@ pub(crate) fn normals(
 
     let stage = progress.stage("vote", 0.5..0.6);
     let chosen = choose(&mut levels, &stage.part(0.0..0.4))?;
-    // Not before most of the memory for surfaces is given back.
-    let normals = Normals::new(points.len(), levels[levels.len() - 1].grid.placed.len(), curvature)?;
-    let mut run = Run { points, normals: &normals, cubes: 0, surfaces: 0, chosen_by: [0; SIZES] };
+    let mut run = Run { batch: BATCH.max(count / 8), normals: &normals, cubes: 0, surfaces: 0, chosen_by: [0; SIZES] };
     let rough = run.settle(&levels, &chosen, 0, &stage.part(0.4..1.0))?;
     let mut noises = Vec::new();
     reserve(&mut noises, chosen.len(), "the surfaces")?;
@@ -109,7 +111,8 @@ pub(crate) fn normals(
 
 /// What goes through all divisions.
 struct Run<'a> {
-    points: &'a Points<'a>,
+    /// About how many points are divided at a time.
+    batch: usize,
     normals: &'a Normals,
     cubes: u64,
     surfaces: u64,
@@ -120,6 +123,7 @@ struct Run<'a> {
 impl Run<'_> {
     /// Finds the normals of all points in the smallest cubes, the last of the levels, but not in those that are to be
     /// divided: answers which are.
+    #[optimize(size)]
     fn settle(
         &mut self,
         levels: &[Level],
@@ -142,13 +146,13 @@ impl Run<'_> {
 
     /// Divides the rough ones of the smallest cubes, some at a time, so that a cloud that is rough everywhere takes hardly
     /// more memory than another.
+    #[optimize(size)]
     fn divide(&mut self, levels: &mut Vec<Level>, division: usize, rough: &[bool], stage: &Stage) -> Result<(), Error> {
-        let most = BATCH.max(self.points.len() / 8);
         let mut start = 0;
         while start < rough.len() {
             let level = &levels[levels.len() - 1];
             let (mut end, mut points) = (start, 0);
-            while end < rough.len() && points < most {
+            while end < rough.len() && points < self.batch {
                 points += if rough[end] { level.points(end).len() } else { 0 };
                 end += 1;
             }

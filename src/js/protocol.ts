@@ -28,7 +28,7 @@ export interface Start extends EstimatorOptions {
 
 export type Call =
   | { kind: 'hello' }
-  | { kind: 'estimate'; positions: Uint8Array<ArrayBuffer>; double: boolean; options: object }
+  | { kind: 'estimate'; positions: Uint8Array<ArrayBuffer>; double: boolean; options: { orient?: any } }
   | { kind: 'read'; file: Bytes; maxPoints?: number }
   | { kind: 'write'; file: Bytes; normals?: Uint8Array; curvature?: Uint8Array; ascii: boolean }
   | {

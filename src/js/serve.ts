@@ -10,8 +10,8 @@ const pieceBytes = 1 << 23;
 /** Asked for at once: each takes a way through another process, and Chromium reads two to three times as fast. */
 const piecesAhead = 4;
 
-/** What a point takes at the least: its position and its normal, and if it is finite its place in the grid. */
-const [anyBytes, finiteBytes] = [24, 16];
+/** What a finite point takes for its place in the grid. */
+const finiteBytes = 16;
 
 /** Returns the receiver of messages. */
 export function serve(post: (reply: Reply, transfer: Transferable[]) => void, platform: Platform) {
@@ -41,7 +41,10 @@ export function serve(post: (reply: Reply, transfer: Transferable[]) => void, pl
 }
 
 /** Throws a `limit` error if the points of a call cannot fit, however they lie: at once, before wasm gets them. */
-function refuse({ positions: { buffer }, double }: Extract<Call, { kind: 'estimate' }>, most: number) {
+function refuse({ positions: { buffer }, double, options }: Extract<Call, { kind: 'estimate' }>, most: number) {
+  const { orient = 'none' } = options;
+  // For its position and its normal; the first is given up before the second comes, if the sign does not need it.
+  const anyBytes = orient === 'none' || orient?.up ? 12 : 24;
   const coordinates = double ? new Float64Array(buffer) : new Float32Array(buffer);
   const points = coordinates.length / 3;
   if (points * (anyBytes + finiteBytes) <= most) return;

@@ -38,32 +38,32 @@ pub(crate) struct Surfaces {
 /// The component of a point without a normal.
 const NONE: u32 = u32::MAX;
 
-/// Turns the normals of all points as `options.orient` asks; answers for surfaces what was decided for each. `density` is that of
-/// the points, if it is known.
+/// Turns the normals of all points as `options.orient` asks; answers for surfaces what was decided for each. `points` may lack if
+/// the signs do not need them ([`Orient::needs_positions`]); `density` is theirs, if it is known.
 ///
 /// Towards a position or a direction: one pass over the points. Otherwise linear in the points; besides these and the normals
 /// some 32 bytes for each on smooth surfaces, up to 190 where there is no surface at all.
 pub(crate) fn orient(
-    points: &Points,
+    points: Option<&Points>,
     normals: &mut [Vec3],
     bounds: &Bounds,
     density: Option<Density>,
     options: &Options,
     stage: &Stage,
 ) -> Result<Option<Surfaces>, Error> {
-    match options.orient {
-        Orient::None => Ok(None),
-        Orient::Viewpoint(viewpoint) => {
-            // Within what three times as much can be added up of.
-            let viewpoint = ((DVec3::from(viewpoint) - points.origin) / points.unit).clamp(-FARTHEST, FARTHEST);
-            face(points, normals, &|point| viewpoint - point.as_dvec3(), stage).map(|()| None)
-        }
-        Orient::Up(up) => {
+    match (options.orient, points) {
+        (Orient::Up(up), _) => {
             // Of length about 1, so that no product vanishes.
             let up = DVec3::from(up) / DVec3::from(up).abs().max_element();
-            face(points, normals, &|_| up, stage).map(|()| None)
+            face(normals, &|_| up, stage).map(|()| None)
         }
-        Orient::Consistent | Orient::Outward => {
+        (Orient::None, _) | (_, None) => Ok(None),
+        (Orient::Viewpoint(viewpoint), Some(points)) => {
+            // Within what three times as much can be added up of.
+            let viewpoint = ((DVec3::from(viewpoint) - points.origin) / points.unit).clamp(-FARTHEST, FARTHEST);
+            face(normals, &|point| viewpoint - points.positions[point].as_dvec3(), stage).map(|()| None)
+        }
+        (Orient::Consistent | Orient::Outward, Some(points)) => {
             let density = density.map_or_else(|| Density::of(points, bounds), Ok)?;
             surfaces(points, normals, bounds, &density, options, stage).map(Some)
         }
@@ -72,19 +72,15 @@ pub(crate) fn orient(
 
 const FARTHEST: DVec3 = DVec3::splat(1e300);
 
-/// Turns every normal to the side that `towards` names; one across it keeps its sign.
-fn face(
-    points: &Points,
-    normals: &mut [Vec3],
-    towards: &(dyn Fn(Vec3) -> DVec3 + Sync),
-    stage: &Stage,
-) -> Result<(), Error> {
+/// Turns the normal of every point to the side that `towards` names; one across it keeps its sign.
+fn face(normals: &mut [Vec3], towards: &(dyn Fn(usize) -> DVec3 + Sync), stage: &Stage) -> Result<(), Error> {
     let count = normals.len();
     let normals = Scatter::new(normals);
-    stage.run(points.chunks(), &|i| {
+    stage.run(count.div_ceil(CHUNK), &|i| {
+        let chunk = parallel::piece(count, CHUNK, i);
         // SAFETY: each point belongs to one chunk.
-        let normals = unsafe { normals.slice(parallel::piece(count, CHUNK, i)) };
-        for (normal, &point) in normals.iter_mut().zip(points.chunk(i)) {
+        let normals = unsafe { normals.slice(chunk.clone()) };
+        for (normal, point) in normals.iter_mut().zip(chunk) {
             if towards(point).dot(normal.as_dvec3()) < 0.0 {
                 *normal = flip(*normal);
             }

@@ -87,6 +87,7 @@ pub(super) fn find(vertex: &Element) -> Result<Option<Vec<Column>>, Error> {
 }
 
 /// The plain number called `name`, or called so in other letter case.
+#[optimize(size)]
 #[inline(never)]
 pub(super) fn column(vertex: &Element, name: &[u8]) -> Option<Column> {
     let mut found = None;

@@ -1,6 +1,7 @@
 //! Blocks of memory that JavaScript fills and reads through views.
 
 use crate::error::Error;
+use crate::points::fitted;
 use bytemuck::AnyBitPattern;
 use wasm_bindgen::prelude::*;
 
@@ -68,6 +69,7 @@ impl Buffer {
     }
 
     /// The bytes as numbers, `per_point` for each point.
+    #[inline(never)]
     pub(super) fn numbers<T: AnyBitPattern>(&self, name: &str, per_point: usize) -> Result<&[T], Error> {
         let bytes = self.bytes();
         if bytes.is_empty() {
@@ -82,32 +84,24 @@ impl Buffer {
     }
 }
 
-#[cfg(feature = "full")]
 impl Buffer {
     /// Gives the numbers away, without a copy unless they were made as bytes.
     pub(super) fn into_floats(self, name: &str, per_point: usize) -> Result<Vec<f32>, Error> {
         let numbers = self.numbers(name, per_point)?;
         match self.storage {
-            Storage::Bytes(_) => copy(numbers, name),
+            Storage::Bytes(_) => fitted(numbers, name),
             Storage::Floats(floats) => Ok(floats),
         }
     }
 
+    #[cfg(feature = "full")]
     /// Gives the bytes away, with a copy if JavaScript made the buffer.
     pub(super) fn into_bytes(self, name: &str) -> Result<Vec<u8>, Error> {
         match self.storage {
             Storage::Bytes(bytes) => Ok(bytes),
-            Storage::Floats(_) => copy(self.bytes(), name),
+            Storage::Floats(_) => fitted(self.bytes(), name),
         }
     }
-}
-
-#[cfg(feature = "full")]
-fn copy<T: Copy>(items: &[T], name: &str) -> Result<Vec<T>, Error> {
-    let mut copied = Vec::new();
-    crate::points::reserve(&mut copied, items.len(), name)?;
-    copied.extend_from_slice(items);
-    Ok(copied)
 }
 
 impl From<Vec<f32>> for Buffer {

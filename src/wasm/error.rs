@@ -6,6 +6,7 @@ use wasm_bindgen::prelude::*;
 
 /// A JavaScript `Error` with `code`, and with what else is known: `line` or `byte`, `needed` and `available`.
 impl From<Error> for JsValue {
+    #[optimize(size)]
     fn from(error: Error) -> Self {
         let error = match error {
             Error::Limit { message, needed, available: None } => {

@@ -10,6 +10,7 @@ use wasm_bindgen::prelude::*;
 ///
 /// Answers with an object of `normals`, a buffer of three 32-bit numbers for each point, of `curvature`, if asked for,
 /// with one, of `components`, if asked for, with one whole number, and of the `report`.
+#[optimize(size)]
 #[wasm_bindgen(unchecked_return_type = "{ normals: Buffer, curvature?: Buffer, components?: Buffer, report: object }")]
 pub fn estimate(
     positions: Buffer,
@@ -19,14 +20,15 @@ pub fn estimate(
 ) -> Result<Object, JsValue> {
     let options = options::parse(options)?;
     let Estimate { normals, curvature, components, report } = call(tell, move |progress| {
-        if double {
+        let points = if double {
             let points = Points::from_f64(positions.numbers("positions", 3)?)?;
             // The points are a copy: what they were copied from is not needed any more.
             drop(positions);
-            crate::estimate::estimate(&points, &options, progress)
+            points
         } else {
-            crate::estimate::estimate(&Points::from_f32(positions.numbers("positions", 3)?)?, &options, progress)
-        }
+            Points::from_vec(positions.into_floats("positions", 3)?)?
+        };
+        crate::estimate::estimate_owned(points, &options, progress)
     })?;
     let estimation = Object::new();
     set(&estimation, "normals", Buffer::from(normals));

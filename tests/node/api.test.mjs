@@ -389,15 +389,18 @@ test('too little memory is a limit error with numbers, and the estimator stays u
   for (const threads of [1, 2]) {
     const estimator = await estimatorFor(context, { threads, memoryMaxMiB: 16 });
     // Refused beforehand, with the least that the whole takes; and what may fit but does not, with what was lacking.
-    await assert.rejects(estimator.estimateNormals(new Float32Array(3e6 * 3)), (error) => {
-      failing('limit', /memory/)(error);
-      assert.deepEqual([error.needed, error.available], [120e6, 2 ** 24]);
-      return true;
-    });
-    await assert.rejects(estimator.estimateNormals(sphere(400_000)), (error) => {
+    const bytes = { none: 28, consistent: 40 };
+    for (const [orient, each] of Object.entries(bytes)) {
+      await assert.rejects(estimator.estimateNormals(new Float32Array(3e6 * 3), { orient }), (error) => {
+        failing('limit', /memory/)(error);
+        assert.deepEqual([error.needed, error.available], [each * 3e6, 2 ** 24]);
+        return true;
+      });
+    }
+    await assert.rejects(estimator.estimateNormals(sphere(500_000)), (error) => {
       failing('limit', /memory/)(error);
       // One of its arrays: at least a number and at most all that there is for a point.
-      return error.needed >= 400_000 * 4 && error.needed < 400_000 * 40 && error.available < 2 ** 24;
+      return error.needed >= 500_000 * 4 && error.needed < 500_000 * 28 && error.available < 2 ** 24;
     });
     const { report } = await estimator.estimateNormals(sphere(1000));
     assert.equal(report.points, 1000);
