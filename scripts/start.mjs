@@ -9,6 +9,8 @@ import { setup } from './setup.mjs';
 const FIRST_PORT = 8080;
 
 await main(async () => {
+  const [unknown] = process.argv.slice(2);
+  if (unknown) throw new Failure(`${unknown} is no argument; another port is set by PORT=8090 npm start`);
   setup();
   build();
   buildPage();
