@@ -76,6 +76,9 @@ impl Groups {
         // Flipping one small group after the other does not reach a far better choice behind worse ones, as where both
         // sides of a thin noisy wall were taken for one.
         let bold = self.descend(span, BOLDNESS, &stage.part(0.4..0.8))?;
+        if bold == flipped {
+            return Ok(flipped);
+        }
         let mut gains = filled(0.0, self.components(), GRAPH)?;
         for (one, &component) in self.component.iter().enumerate() {
             gains[component as usize] += score(links, own, &bold, one) - score(links, own, &flipped, one);
@@ -86,7 +89,6 @@ impl Groups {
             }
         }
         mend(links, &|one| own[one], &mut flipped)?;
-        stage.tell(1.0)?;
         Ok(flipped)
     }
 
