@@ -90,10 +90,11 @@ pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Resu
     run(points.borrowed(), options, progress)
 }
 
-/// The same, but gives the positions up when they are sorted, unless signs need them: 12 bytes a point less.
+/// As [`estimate`], with the same result, of points that own their memory ([`Points::from_vec`], [`Points::from_f64`]): it is
+/// given up when they are sorted, unless signs need it, so that they take 12 bytes a point less at the most.
 ///
 /// # Errors
-/// As [`estimate`].
+/// Those of [`estimate`].
 pub fn estimate_owned(points: Points, options: &Options, progress: &Progress) -> Result<Estimate, Error> {
     run(points, options, progress)
 }

@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 pub(crate) struct Placed {
     /// The place in the brick, in edges, 0 to 4.
     pub local: Vec3,
-    /// Which point of the input it is.
+    /// Its number in what was sorted.
     pub point: u32,
 }
 

@@ -165,6 +165,35 @@ mod tests {
         BRICK * brick + cube_centre(bit).as_ivec3()
     }
 
+    /// Through all divisions there can be and back, next to the sides of cubes and far from the origin: places in other
+    /// grids stand for one cube in each.
+    #[test]
+    fn places_in_other_grids_are_in_parts_of_the_same_cubes() {
+        for start in [0.0, f64::from(1 << 19)] {
+            let bounds = Bounds { min: Vec3::ZERO, max: Vec3::splat((1 << 22) as f32), finite: 2 };
+            let base = Lattice::new(&bounds, &|| DVec3::ZERO, 1.0, CUBES);
+            for side in 0..64 {
+                for step in [0.0f64, 1e-7, 3e-7, 0.1, 0.3, 0.49999997, 0.5, 0.99999994] {
+                    let point = Vec3::splat((start + f64::from(side) + step) as f32);
+                    let (mut coarse, mut lattice) = (base, base);
+                    let (mut brick, mut local) = (base.brick(point).unwrap().as_ivec3(), base.local(point));
+                    for _ in 0..8 {
+                        let place = |brick: IVec3, local: Vec3| BRICK * brick + local.as_ivec3();
+                        lattice = lattice.finer();
+                        let (from, finer) = (brick, lattice.for_places_in(brick, 2.0));
+                        let whole = place(brick, local);
+                        (brick, local) = (finer.brick(local).unwrap().as_ivec3(), finer.local(local));
+                        assert_eq!(place(brick, local) / 2, whole, "{point}");
+                        let back = coarse.for_places_in(brick, 0.5);
+                        assert_eq!(back.brick(local).unwrap().as_ivec3(), from, "{point}");
+                        assert_eq!(place(from, back.local(local)), whole, "{point}");
+                        coarse = lattice;
+                    }
+                }
+            }
+        }
+    }
+
     /// Also next to their sides, where single precision does not tell a place from the side.
     #[test]
     fn cubes_of_half_the_edge_are_parts_of_the_whole_ones() {

@@ -77,7 +77,10 @@ pub enum Orient {
 impl Orient {
     /// Whether signs depend on where the points are.
     pub(crate) fn needs_positions(self) -> bool {
-        !matches!(self, Self::None | Self::Up(_))
+        match self {
+            Self::None | Self::Up(_) => false,
+            Self::Consistent | Self::Outward | Self::Viewpoint(_) => true,
+        }
     }
 }
 

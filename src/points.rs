@@ -32,7 +32,7 @@ impl<'a> Points<'a> {
         Ok(Self { positions: Cow::Borrowed(cast_slice(coordinates)), origin: DVec3::ZERO, unit: 1.0 })
     }
 
-    /// The same for a list that is given up with the points. Copied only if it has room for more.
+    /// Takes over `x0 y0 z0 x1 ...`, and gives back what room there is for more. Costs nothing without that.
     pub fn from_vec(coordinates: Vec<f32>) -> Result<Points<'static>, Error> {
         check_length(coordinates.len())?;
         let positions = bytemuck::cast_slice_box(coordinates.into_boxed_slice()).into_vec();
@@ -57,7 +57,7 @@ impl<'a> Points<'a> {
         self.origin.to_array()
     }
 
-    /// The same, without the memory.
+    /// The same points, borrowed from these.
     pub(crate) fn borrowed(&self) -> Points<'_> {
         Points { positions: Cow::Borrowed(&self.positions), ..*self }
     }

@@ -42,7 +42,7 @@ fn peak_bytes_a_point() {
         .map(|i| if i % 3 == 0 { 1e6 * random.signed() as f32 } else { random.signed() as f32 })
         .collect();
     // Input and normals are 12 bytes each; the input is given up before, unless signs need it.
-    let (none, consistent) = (Orient::None, Orient::Consistent);
+    let (none, consistent, viewpoint) = (Orient::None, Orient::Consistent, Orient::Viewpoint([9.0; 3]));
     for (name, points, cell, orient, bound) in [
         ("sphere, 1.5 L", &sphere, Cell::Scale(1.5), none, 34),
         ("sphere, 1.0 L", &sphere, Cell::Scale(1.0), none, 34),
@@ -53,6 +53,8 @@ fn peak_bytes_a_point() {
         ("a needle", &needle, Cell::Scale(1.0), none, 74),
         ("as many cubes as points", &sphere, Cell::Scale(0.1), none, 92),
         ("far more cubes than points", &sphere, Cell::Size(1e-6), none, 130),
+        ("auto with signs on a sphere", &sphere, Cell::Auto, consistent, 54),
+        ("auto with signs, rough everywhere", &noisy, Cell::Auto, viewpoint, 86),
         ("signs on a sphere", &sphere, Cell::Scale(1.5), consistent, 60),
         ("signs with a stray point", &stray(3e6), Cell::Scale(1.5), consistent, 60),
         ("signs in a solid, where patches are many", &noisy, Cell::Scale(1.5), consistent, 215),

@@ -68,9 +68,9 @@ const FLAT: f32 = 2.0;
 /// Square angles less than this are no difference.
 const SAME: f32 = 1e-5;
 
-/// Chooses for every cube of the last of the levels, which come from large cubes to small ones; its samples are given up.
+/// Chooses for every cube of the last of the levels, which come from large cubes to small ones.
 #[inline(never)]
-pub(super) fn choose(levels: &mut [Level], stage: &Stage) -> Result<Vec<Chosen>, Error> {
+pub(super) fn choose(levels: &[Level], stage: &Stage) -> Result<Vec<Chosen>, Error> {
     let smallest = &levels[levels.len() - 1];
     let chosen = Filling::new(smallest.grid.cubes(), "the surfaces")?;
     smallest.grid.each_cube(stage, &|brick, cube, bit| {
@@ -78,7 +78,6 @@ pub(super) fn choose(levels: &mut [Level], stage: &Stage) -> Result<Vec<Chosen>,
         // SAFETY: once for each cube.
         unsafe { chosen.write(cube, of_cube(levels, place, smallest.centroid(cube))) };
     })?;
-    levels[levels.len() - 1].release_samples();
     // SAFETY: these were all cubes.
     Ok(unsafe { chosen.complete() })
 }

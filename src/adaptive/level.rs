@@ -9,7 +9,7 @@ use crate::lattice::{BRICK, Lattice, cube_centre};
 use crate::parallel::Filling;
 use crate::points::reserve;
 use crate::progress::Stage;
-use crate::source::{Other, Source};
+use crate::source::{OtherGrid, Source};
 use glam::{IVec3, Vec3};
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -89,7 +89,7 @@ impl Level {
         })?;
         // SAFETY: these were all cubes.
         let (positions, wholes) = unsafe { (positions.complete(), wholes.complete()) };
-        let other = Other { bricks: &grid.bricks.places, ends: &grid.first_cube[1..], edge: 0.5 };
+        let other = OtherGrid { bricks: &grid.bricks.places, ends: &grid.first_cube[1..], edge: 0.5 };
         let lattice = self.lattice.coarser();
         let source = Source { lattice, positions: &positions, numbers: None, other: Some(other) };
         let mut level = Self::new(&source, &stage.part(0.3..0.9))?;
@@ -151,7 +151,7 @@ impl Level {
 
         // SAFETY: the blocks hold all bricks, and these all points that were counted.
         let (positions, numbers) = unsafe { (positions.complete(), numbers.complete()) };
-        let other = Other { bricks: &grid.bricks.places, ends: &ends[1..], edge: 2.0 };
+        let other = OtherGrid { bricks: &grid.bricks.places, ends: &ends[1..], edge: 2.0 };
         let lattice = self.lattice.finer().part(2 * first, 2 * last + 1);
         let source = Source { lattice, positions: &positions, numbers: Some(&numbers), other: Some(other) };
         let mut level = Self::new(&source, &stage.part(0.2..0.45))?;

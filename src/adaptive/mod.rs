@@ -51,7 +51,8 @@ const _: () = assert!(CUBES == (2 << DOUBLINGS) as f64);
 /// Sizes of cubes in all.
 const SIZES: usize = DIVISIONS + DOUBLINGS + 1;
 
-/// Finds the normals of all points on cubes of `lattice`. Calls `lap` at the end of each phase. In time linear in the points; what is divided to the end takes some ten times as long as what is smooth.
+/// Finds the normals of all points on cubes of `lattice`; gives the points up when they are sorted. Calls `lap` at the end of
+/// each phase. In time linear in the points; what is divided to the end takes some ten times as long as what is smooth.
 #[optimize(size)]
 #[inline(never)]
 pub(crate) fn normals(
@@ -89,7 +90,9 @@ pub(crate) fn normals(
     lap("surfaces");
 
     let stage = progress.stage("vote", 0.5..0.6);
-    let chosen = choose(&mut levels, &stage.part(0.0..0.4))?;
+    let chosen = choose(&levels, &stage.part(0.0..0.4))?;
+    let base = levels.len() - 1;
+    levels[base].release_samples();
     let mut run = Run { batch: BATCH.max(count / 8), normals: &normals, cubes: 0, surfaces: 0, chosen_by: [0; SIZES] };
     let rough = run.settle(&levels, &chosen, 0, &stage.part(0.4..1.0))?;
     let mut noises = Vec::new();
@@ -162,6 +165,8 @@ impl Run<'_> {
                 let finer = level.divided(rough, start..end, &stage.part(0.0..0.3))?;
                 levels.push(finer);
                 let chosen = choose(levels, &stage.part(0.3..0.4))?;
+                let finest = levels.len() - 1;
+                levels[finest].release_samples();
                 let rough = self.settle(levels, &chosen, division + 1, &stage.part(0.4..0.5))?;
                 drop(chosen);
                 self.divide(levels, division + 1, &rough, &stage.part(0.5..1.0))?;

@@ -43,7 +43,7 @@ export function serve(post: (reply: Reply, transfer: Transferable[]) => void, pl
 /** Throws a `limit` error if the points of a call cannot fit, however they lie: at once, before wasm gets them. */
 function refuse({ positions: { buffer }, double, options }: Extract<Call, { kind: 'estimate' }>, most: number) {
   const { orient = 'none' } = options;
-  // For its position and its normal; the first is given up before the second comes, if the sign does not need it.
+  // Its normal takes the place of its position, unless the sign needs that.
   const anyBytes = orient === 'none' || orient?.up ? 12 : 24;
   const coordinates = double ? new Float64Array(buffer) : new Float32Array(buffer);
   const points = coordinates.length / 3;

@@ -76,6 +76,7 @@ impl Groups {
         // Flipping one small group after the other does not reach a far better choice behind worse ones, as where both
         // sides of a thin noisy wall were taken for one.
         let bold = self.descend(span, BOLDNESS, &stage.part(0.4..0.8))?;
+        // Both were mended last of all.
         if bold == flipped {
             return Ok(flipped);
         }

@@ -38,8 +38,8 @@ pub(crate) struct Surfaces {
 /// The component of a point without a normal.
 const NONE: u32 = u32::MAX;
 
-/// Turns the normals of all points as `options.orient` asks; answers for surfaces what was decided for each. `points` may lack if
-/// the signs do not need them ([`Orient::needs_positions`]); `density` is theirs, if it is known.
+/// Turns the normals of all points as `options.orient` asks; answers for surfaces what was decided for each. `points` may
+/// be missing if the signs do not need them ([`Orient::needs_positions`]); `density` is theirs, if it is known.
 ///
 /// Towards a position or a direction: one pass over the points. Otherwise linear in the points; besides these and the normals
 /// some 32 bytes for each on smooth surfaces, up to 190 where there is no surface at all.
@@ -51,6 +51,7 @@ pub(crate) fn orient(
     options: &Options,
     stage: &Stage,
 ) -> Result<Option<Surfaces>, Error> {
+    debug_assert!(points.is_some() || !options.orient.needs_positions());
     match (options.orient, points) {
         (Orient::Up(up), _) => {
             // Of length about 1, so that no product vanishes.

@@ -82,9 +82,7 @@ impl Buffer {
             _ => Err(Error::Input(format!("{name} has {} bytes; wanted a multiple of {wanted}", bytes.len()))),
         }
     }
-}
 
-impl Buffer {
     /// Gives the numbers away, without a copy unless they were made as bytes.
     pub(super) fn into_floats(self, name: &str, per_point: usize) -> Result<Vec<f32>, Error> {
         let numbers = self.numbers(name, per_point)?;
@@ -94,8 +92,8 @@ impl Buffer {
         }
     }
 
-    #[cfg(feature = "full")]
     /// Gives the bytes away, with a copy if JavaScript made the buffer.
+    #[cfg(feature = "full")]
     pub(super) fn into_bytes(self, name: &str) -> Result<Vec<u8>, Error> {
         match self.storage {
             Storage::Bytes(bytes) => Ok(bytes),

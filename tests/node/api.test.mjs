@@ -389,8 +389,13 @@ test('too little memory is a limit error with numbers, and the estimator stays u
   for (const threads of [1, 2]) {
     const estimator = await estimatorFor(context, { threads, memoryMaxMiB: 16 });
     // Refused beforehand, with the least that the whole takes; and what may fit but does not, with what was lacking.
-    const bytes = { none: 28, consistent: 40 };
-    for (const [orient, each] of Object.entries(bytes)) {
+    const bytes = [
+      ['none', 28],
+      [{ up: [0, 0, 1] }, 28],
+      [{ viewpoint: [0, 0, 9] }, 40],
+      ['consistent', 40],
+    ];
+    for (const [orient, each] of bytes) {
       await assert.rejects(estimator.estimateNormals(new Float32Array(3e6 * 3), { orient }), (error) => {
         failing('limit', /memory/)(error);
         assert.deepEqual([error.needed, error.available], [each * 3e6, 2 ** 24]);
