@@ -18,7 +18,7 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 pub(crate) struct Placed {
     /// The place in the brick, in edges, 0 to 4.
     pub local: Vec3,
-    /// Its number in what was sorted.
+    /// Its number, as the source has it.
     pub point: u32,
 }
 

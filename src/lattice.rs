@@ -24,6 +24,7 @@ pub(crate) struct Lattice {
 impl Lattice {
     /// A grid within some bounds. Where that is more than `most` cubes along an axis, half of `most` on either side of
     /// `centre()`: points beyond are out of reach.
+    // Its centre is then no call through a pointer, which is smaller by 0.2 KiB.
     #[inline(always)]
     pub fn new(bounds: &Bounds, centre: &dyn Fn() -> DVec3, edge: f64, most: f64) -> Self {
         let (min, max) = (bounds.min.as_dvec3(), bounds.max.as_dvec3());

@@ -43,7 +43,7 @@ export function serve(post: (reply: Reply, transfer: Transferable[]) => void, pl
 /** Throws a `limit` error if the points of a call cannot fit, however they lie: at once, before wasm gets them. */
 function refuse({ positions: { buffer }, double, options }: Extract<Call, { kind: 'estimate' }>, most: number) {
   const { orient = 'none' } = options;
-  // Its normal takes the place of its position, unless the sign needs that.
+  // Any point's normal takes the place of its position, unless the sign needs that.
   const anyBytes = orient === 'none' || orient?.up ? 12 : 24;
   const coordinates = double ? new Float64Array(buffer) : new Float32Array(buffer);
   const points = coordinates.length / 3;
