@@ -65,7 +65,7 @@ pub(crate) fn normals(
     let mut base = Level::new(&Source::new(&points, *lattice), &progress.stage("sort", 0.06..0.28))?;
     let count = points.len();
     drop(points);
-    // At once, to have the memory of the positions, in which there would be room for nothing else as large.
+    // At once: they fit into the memory that the positions had, unless something smaller takes a part of it first.
     let normals = Normals::new(count, base.grid.placed.len(), curvature)?;
     base.sample(None, &progress.stage("sort", 0.28..0.3))?;
     lap("sort");
