@@ -8,6 +8,9 @@ const clippy = (...args) => run('cargo', ['clippy', ...args, '--', '-D', 'warnin
 const wasm = ['--target', 'wasm32-unknown-unknown'];
 const checks = {
   'Rust is formatted': () => run('cargo', ['fmt', '--check']),
+  // A crate of its own, so that nobody downloads its peers to run the tests.
+  'Rust of the peers is formatted': () =>
+    run('cargo', ['fmt', '--check', '--manifest-path', 'benches/peers/Cargo.toml']),
   'clippy, native': () => clippy('--all-targets'),
   'clippy, native without threads': () => clippy('--all-targets', '--no-default-features', '--features', 'full'),
   'clippy, wasm core': () => clippy('--lib', '--no-default-features', ...wasm),
