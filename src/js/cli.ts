@@ -7,6 +7,7 @@ import { basename, dirname, join } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { parseArgs } from 'node:util';
 import { createEstimator } from './node.js';
+import { scannerOf } from './scanner.js';
 import type { EstimateOptions, PointCloud, Progress, Report, Source } from './types.js';
 
 const help = `Usage: bilinormal IN.ply -o OUT.ply [options]
@@ -20,7 +21,8 @@ is kept, existing normals are replaced. IN may be - for standard input.
       --cell-scale S     ... in multiples of cbrt(volume / points), 0.1 to 100; larger averages more noise away
       --cell-size L      ... in the units of the file
       --k N              nearest points of knn (default 16), candidates of egg (default 8); at least 3
-      --orient HOW       none (default), consistent, outward, viewpoint=x,y,z or up=x,y,z
+      --orient HOW       none (default), consistent, outward, viewpoint=x,y,z, up=x,y,z, or scanner: towards where the
+                         file says that it stood
       --curvature        add the surface variation as the property curvature
       --threads N        default: one for each processor
       --ascii            write text instead of little-endian binary
@@ -36,7 +38,8 @@ class UsageError extends Error {}
 interface Task {
   input: string;
   output: string;
-  estimate: EstimateOptions;
+  estimate: Omit<EstimateOptions, 'orient'>;
+  orient: EstimateOptions['orient'] | 'scanner';
   threads: number | 'auto';
   ascii: boolean;
   json: boolean;
@@ -76,7 +79,7 @@ function parse(args: string[]): Task | undefined {
   if (more.length) throw new UsageError(`one input file at a time; ${more.join(' ')} came too`);
   if (!values.out) throw new UsageError('no output file; give one with -o');
   if (values.out === '-') throw new UsageError('the output cannot be standard output, where the report goes');
-  const estimate: EstimateOptions = {};
+  const estimate: Task['estimate'] = {};
   if (values.method !== undefined) estimate.method = choice('method', values.method, ['bilinear', 'knn', 'egg']);
   const cells = [values.cell, values['cell-scale'], values['cell-size']].filter((value) => value !== undefined);
   if (cells.length > 1) throw new UsageError('--cell, --cell-scale and --cell-size exclude each other');
@@ -84,12 +87,12 @@ function parse(args: string[]): Task | undefined {
   if (values['cell-scale'] !== undefined) estimate.cell = { scale: number('cell-scale', values['cell-scale']) };
   if (values['cell-size'] !== undefined) estimate.cell = { size: number('cell-size', values['cell-size']) };
   if (values.k !== undefined) estimate.k = wholeNumber('k', values.k, 3);
-  if (values.orient !== undefined) estimate.orient = parseOrient(values.orient);
   if (values.curvature) estimate.curvature = true;
   return {
     input,
     output: values.out,
     estimate,
+    orient: values.orient === undefined ? 'none' : parseOrient(values.orient),
     threads: values.threads === undefined ? 'auto' : wholeNumber('threads', values.threads),
     ascii: values.ascii ?? false,
     json: values.json ?? false,
@@ -116,15 +119,17 @@ function wholeNumber(option: string, value: string, least = 1): number {
   return found;
 }
 
-function parseOrient(value: string): EstimateOptions['orient'] {
+function parseOrient(value: string): Task['orient'] {
+  if (value === 'none' || value === 'consistent' || value === 'outward' || value === 'scanner') return value;
   const [how, place] = value.split('=');
-  if (place === undefined) return choice('orient', value, ['none', 'consistent', 'outward']);
+  if (place === undefined || (how !== 'viewpoint' && how !== 'up'))
+    throw new UsageError(
+      `--orient is ${value}; wanted none, consistent, outward, scanner, viewpoint=x,y,z or up=x,y,z`,
+    );
   const [x, y, z, ...more] = place.split(',').map((part) => number('orient', part));
   if (z === undefined || more.length)
     throw new UsageError(`--orient is ${value}; wanted three numbers, as ${how}=x,y,z`);
-  if (how === 'viewpoint') return { viewpoint: [x!, y!, z] };
-  if (how === 'up') return { up: [x!, y!, z] };
-  throw new UsageError(`--orient is ${value}; wanted none, consistent, outward, viewpoint=x,y,z or up=x,y,z`);
+  return how === 'up' ? { up: [x!, y!, z] } : { viewpoint: [x!, y!, z] };
 }
 
 /** Reads, estimates, writes. Errors name the file they belong to. */
@@ -136,7 +141,8 @@ async function run(task: Task): Promise<Report> {
   try {
     const { normals, curvature, report } = await about(task.input, async () => {
       const cloud = await estimator.readPointCloud(source, { onProgress: show?.('reading') });
-      const options = { ...withViewpoint(task.estimate, cloud), transfer: true, onProgress: show?.('computing') };
+      const orient = orientIn(cloud, task.orient);
+      const options = { ...task.estimate, orient, transfer: true, onProgress: show?.('computing') };
       return estimator.estimateNormals(cloud.positions, options);
     });
     // Another one, so that the memory of the first is free again.
@@ -197,10 +203,16 @@ async function checkFolder(path: string): Promise<void> {
 }
 
 /** The command line speaks of the file's coordinates, the estimator of positions relative to the cloud's origin. */
-function withViewpoint(options: EstimateOptions, { origin }: PointCloud): EstimateOptions {
-  if (typeof options.orient !== 'object' || !('viewpoint' in options.orient)) return options;
-  const [x, y, z] = options.orient.viewpoint;
-  return { ...options, orient: { viewpoint: [x - origin[0], y - origin[1], z - origin[2]] } };
+function orientIn(cloud: PointCloud, orient: Task['orient']): EstimateOptions['orient'] {
+  if (orient === 'scanner') {
+    const viewpoint = scannerOf(cloud);
+    if (viewpoint) return { viewpoint };
+    throw new Error('--orient is scanner, but the file does not say where it stood; give --orient viewpoint=x,y,z');
+  }
+  if (typeof orient !== 'object' || !('viewpoint' in orient)) return orient;
+  const [x, y, z] = orient.viewpoint;
+  const { origin } = cloud;
+  return { viewpoint: [x - origin[0], y - origin[1], z - origin[2]] };
 }
 
 /** Under a temporary name beside `path`, then renamed: nobody ever sees half a file. */

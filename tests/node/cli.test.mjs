@@ -105,6 +105,24 @@ test('--orient chooses the side, and the report tells of surfaces', () => {
   assert.ok(propertyOf(written('turned.ply'), 'vertex', 'nz').values.every((nz) => nz <= 0));
 });
 
+test('--orient scanner takes the place that the file tells, in its own coordinates', () => {
+  const away = [691000.5, 5336000.25, 512];
+  const body = Float64Array.from(positions, (value, i) => value + away[i % 3]);
+  const said = `comment scanner position: ${away.join(' ')}\nelement`;
+  const surveyed = header(20000).replaceAll('float', 'double').replace('element', said);
+  writeFileSync(join(folder, 'surveyed.ply'), Buffer.concat([Buffer.from(surveyed), Buffer.from(body.buffer)]));
+  assert.equal(run(['surveyed.ply', '-o', 'seen.ply', '--orient', 'scanner', '--quiet']).status, 0);
+  const normals = normalsOf(written('seen.ply'));
+  for (let at = 0; at < normals.length; at += 3) {
+    assert.ok(
+      positions[at] * normals[at] + positions[at + 1] * normals[at + 1] + positions[at + 2] * normals[at + 2] < 0,
+    );
+  }
+  const { status, stderr } = run(['sphere.ply', '-o', 'unseen.ply', '--orient', 'scanner']);
+  assert.equal(status, 1);
+  assert.match(stderr, /^bilinormal: sphere\.ply: .*does not say where it stood/);
+});
+
 test('--json prints the report as one line, --quiet nothing', () => {
   const { stdout } = run([
     'sphere.ply',

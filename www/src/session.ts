@@ -1,10 +1,10 @@
 // What a person can have done, as one flow: file -> readPointCloud -> viewer.show -> estimateNormals ->
 // viewer.setNormals -> report. One job runs at a time; a new one cancels it. Curvature is computed while it is shown.
 import { estimateNormals, readPointCloud, writePly, type EstimateOptions } from 'bilinormal';
+import { scannerOf } from '../../src/js/scanner';
 import { boundsOf, guessUp } from './bounds';
 import { METHODS, hasSurfaces, orientOf, parseOptions } from './options';
 import { colorsOf } from './ramp';
-import { scannerOf } from './scanner';
 import { UNTURNED, type Store, type Turned } from './state';
 import type { Viewer } from './viewer';
 

@@ -1,5 +1,6 @@
-// Where a scan was taken from, if its file says so.
-import type { PointCloud } from 'bilinormal';
+// Where a scan was taken from, if its file says so: for the command line and the page. Not in the package, which leaves
+// comments to its callers.
+import type { PointCloud } from './types.js';
 
 /** Relative to the cloud's origin, as its positions are. */
 export function scannerOf({ source, origin }: PointCloud): [number, number, number] | undefined {
