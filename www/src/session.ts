@@ -7,9 +7,10 @@ import { METHODS, hasSurfaces, orientOf, parseOptions } from './options';
 import { colorsOf } from './ramp';
 import { UNTURNED, type Store, type Turned } from './state';
 import type { Viewer } from './viewer';
+import { warmingCloud } from './warming';
 
 export interface Session {
-  /** Starts the workers, so that the first file need not wait for them. */
+  /** Starts the workers and lets the browser compile them for speed, so that the first file need not wait for that. */
   warm(): void;
   open(file: File): Promise<void>;
   openSample(): Promise<void>;
@@ -145,10 +146,11 @@ export function createSession(store: Store, viewer: Viewer): Session {
 
   return {
     warm() {
-      // One for files and plain normals, one for signs. What goes wrong here goes wrong again with a file, and is told then.
-      for (const orient of ['none', 'consistent'] as const) {
-        estimateNormals(new Float32Array(), { orient }).catch(() => {});
-      }
+      // What goes wrong here goes wrong again with a file, and is told then.
+      const ignore = () => {};
+      // One worker for files and plain normals, one for signs, which are what the page asks for by itself.
+      estimateNormals(new Float32Array()).catch(ignore);
+      estimateNormals(warmingCloud(), { orient: 'consistent', components: true }).catch(ignore);
     },
 
     open: (file) =>
