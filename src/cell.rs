@@ -22,6 +22,9 @@ const PROBES: usize = 256;
 /// At these places 'auto' counts about this many points, or the 64th part of the cloud if that is more.
 const PROBED_POINTS: f64 = 32768.0;
 
+/// More points than these in the smallest cubes counted, in the mean, are not told apart yet.
+const CROWDED: f64 = 2.0;
+
 /// Halvings of a probe's edge that 'auto' counts.
 const LEVELS: u32 = 10;
 /// A number for a probe's edge, and for that halved 1 to [`LEVELS`] times.
@@ -67,7 +70,7 @@ pub(crate) struct Density {
 }
 
 impl Density {
-    /// One pass over the points.
+    /// One pass over the points, more where the cloud is far smaller than its box.
     ///
     /// The mean of 1 / (points in the cube of a point), taken over all points, is the share of occupied cubes in points.
     /// So a few points chosen at random ("probes") tell it without bias, whatever the extent of the cloud: the cubes round
@@ -81,8 +84,18 @@ impl Density {
             let edge = paper_edge(bounds.extent(), count);
             return Ok(Self { middle: bulk.median, count, edge, occupancy: [0.0; LEVELS as usize + 1] });
         }
-        let probes = Probes::place(&bulk, extent, count);
-        Ok(Self { middle: bulk.median, count, edge: probes.edge, occupancy: probes.count(points)? })
+        let mut probes = Probes::place(&bulk, extent, count);
+        let mut occupancy = probes.count(points)?;
+        // Where most of the box is empty even their last halves hold many points: on from there, unless these coincide.
+        while occupancy[LEVELS as usize] > CROWDED {
+            let smaller = Probes::place(&bulk, probes.edge * exp2(-f64::from(LEVELS)), count);
+            let counted = smaller.count(points)?;
+            if counted[LEVELS as usize] > 0.9 * occupancy[LEVELS as usize] {
+                break;
+            }
+            (probes, occupancy) = (smaller, counted);
+        }
+        Ok(Self { middle: bulk.median, count, edge: probes.edge, occupancy })
     }
 
     /// The edge of cubes that hold about `wanted` points each.
