@@ -5,6 +5,7 @@ mod common;
 
 use bilinormal::{Cell, Estimate};
 use common::*;
+use std::f64::consts::TAU;
 
 fn errors(cloud: &Cloud) -> (Vec<f64>, Estimate) {
     let result = run(&cloud.points, Cell::Auto);
@@ -141,4 +142,74 @@ fn rough_clusters_far_apart() {
         result.normals.chunks(3).filter(|n| (n.iter().map(|c| c * c).sum::<f32>() - 1.0).abs() < 1e-3).count();
     assert_eq!(resolved as u64 + result.report.unresolved, 60_000);
     assert_eq!(result.normals.chunks(3).filter(|n| n == &[0.0; 3]).count() as u64, result.report.unresolved);
+}
+
+/// Where most of the box is empty, cubes fit the objects and not the box.
+#[test]
+fn small_objects_far_apart() {
+    for (count, apart) in [(2, 300.0), (2, 1000.0), (2, 10_000.0), (10, 100.0), (10, 1000.0)] {
+        for points in [500, 2000] {
+            let error = root_mean_square(&errors(&balls(count, points, |i| [apart * i as f64, 0.0, 0.0])).0);
+            println!("{count} balls of {points} points, {apart} apart: {error} degrees");
+            assert!(error < 2.0, "{count} balls of {points} points, {apart} apart: {error} degrees");
+        }
+    }
+}
+
+/// What looks like one thick surface to large neighbourhoods is divided until it is seen what it is.
+#[test]
+fn thin_objects_are_no_noise() {
+    let mut random = Random(17);
+    let mut places: Vec<[f64; 3]> = Vec::new();
+    while places.len() < 200 {
+        places.push([(); 3].map(|()| 100.0 * random.unit()));
+    }
+    let mut astray = sphere(10_000, 18);
+    for _ in 0..500 {
+        astray.points.extend([(); 3].map(|()| (100.0 * random.gauss()) as f32));
+    }
+    for (name, cloud, bound) in [
+        ("pipe", pipe(f64::INFINITY, 12_000), 3.0),
+        ("ring", pipe(20.0, 7500), 2.5),
+        ("larger ring", pipe(100.0, 63_000), 2.5),
+        ("200 balls", balls(200, 150, |i| places[i]), 6.0),
+        ("ball among stray points", astray, 1.0),
+    ] {
+        let normals = run(&cloud.points, Cell::Auto).normals;
+        let error = root_mean_square(&angles(&normals[..3 * cloud.normals.len()], &cloud.normals));
+        println!("{name}: {error} degrees");
+        assert!(error < bound, "{name}: {error} degrees");
+    }
+}
+
+/// Its points lie along a line for all cubes but the smallest.
+#[test]
+fn a_strip_has_normals() {
+    let mut random = Random(19);
+    let points: Vec<f32> =
+        (0..20_000).flat_map(|_| [30_000.0 * random.unit(), random.unit(), 0.0].map(|c| c as f32)).collect();
+    assert_eq!(run(&points, Cell::Auto).report.unresolved, 0);
+}
+
+/// Unit spheres of some points each.
+fn balls(count: usize, points: usize, place: impl Fn(usize) -> [f64; 3]) -> Cloud {
+    let mut random = Random(20);
+    Cloud::of((0..count * points).map(|i| {
+        let (normal, place) = (random.direction(), place(i % count));
+        ([0, 1, 2].map(|axis| place[axis] + normal[axis]), normal)
+    }))
+}
+
+/// A tube of radius 1 along a circle, or if that has no end along a line of length 200.
+fn pipe(radius: f64, points: usize) -> Cloud {
+    let mut random = Random(21);
+    Cloud::of((0..points).map(|_| {
+        let (along, around) = (random.unit(), TAU * random.unit());
+        let (out, up) = (around.cos(), around.sin());
+        if radius == f64::INFINITY {
+            return ([200.0 * along, out, up], [0.0, out, up]);
+        }
+        let (x, y) = ((TAU * along).cos(), (TAU * along).sin());
+        ([(radius + out) * x, (radius + out) * y, up], [out * x, out * y, up])
+    }))
 }

@@ -230,7 +230,7 @@ impl Level {
                     window.add(&self.samples, range(&self.sample_end, near), step, shares.element_product());
                 }
                 // SAFETY: once for each cube.
-                unsafe { surfaces.write(cube, window.fit().unwrap_or(Surface::NONE)) };
+                unsafe { surfaces.write(cube, window.fit()) };
             }
         })?;
         // SAFETY: these were all cubes.

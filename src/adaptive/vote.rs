@@ -35,6 +35,10 @@ const SMOOTH_IN_NOISE: f32 = 0.12;
 /// Cubes whose surface rests on fewer points are not divided: the surfaces of the halves would rest on a quarter of them.
 const DIVIDED_POINTS: f32 = 60.0;
 
+/// Where the normal is not known any better, square radians, the cube is divided as long as it can be: whatever is so uncertain
+/// agrees with everything.
+const UNSURE: f32 = 0.07;
+
 /// One over the variance of points anywhere in a sample, which is half an edge wide.
 const SAMPLE: f32 = 48.0;
 
@@ -102,7 +106,8 @@ impl<'a> Task<'a> {
         if own.is_some() {
             self.around.near(&level.grid, brick, bit, 1, &mut self.near);
             let is_noisy = self.is_noisy(own, surface);
-            if is_noisy || !(can_divide && surface.lacks_detail) {
+            let is_unsure = own.error > UNSURE;
+            if !(can_divide && (is_unsure || !is_noisy && surface.lacks_detail)) {
                 self.ballot.invite(&self.near, chosen, f32::INFINITY);
                 let tolerance = if is_noisy { SMOOTH_IN_NOISE } else { SMOOTH };
                 smooth = self.ballot.smooth(own.quadric.centre, tolerance);
@@ -148,12 +153,16 @@ impl<'a> Task<'a> {
 
     /// Whether noise decides in a cube: it and three quarters of the cubes near it rest on larger neighbourhoods than the
     /// smallest, and their points lie off the surface within the samples too. The sides of a thin wall are samples of their
-    /// own. Dividing such a cube would only take points away, and its parts would rest on the same surfaces.
+    /// own; and where the smallest neighbourhood does not know its normal, what looks like noise may be the tube of a ring, which
+    /// from afar is a plane. Dividing a noisy cube would only take points away, and its parts would rest on the same surfaces.
     fn is_noisy(&self, own: &Chosen, surface: &Surface) -> bool {
         let is_coarse = |&&(_, cube): &&(Vec3, usize)| self.vote.chosen[cube].doublings > 0;
         let coarse = self.near.iter().filter(is_coarse).count();
         let within = own.noise / (1.0 + SAMPLE * own.noise);
-        own.doublings > 0 && 4 * coarse >= 3 * self.near.len() && surface.within >= WITHIN * within
+        surface.error <= UNSURE
+            && own.doublings > 0
+            && 4 * coarse >= 3 * self.near.len()
+            && surface.within >= WITHIN * within
     }
 }
 
