@@ -151,28 +151,38 @@ impl Run<'_> {
     /// more memory than another.
     #[optimize(size)]
     fn divide(&mut self, levels: &mut Vec<Level>, division: usize, rough: &[bool], stage: &Stage) -> Result<(), Error> {
-        let mut start = 0;
-        while start < rough.len() {
-            let level = &levels[levels.len() - 1];
-            let (mut end, mut points) = (start, 0);
-            while end < rough.len() && points < self.batch {
-                points += if rough[end] { level.points(end).len() } else { 0 };
-                end += 1;
+        let last = levels.len() - 1;
+        let mut batches = Vec::new();
+        let (mut start, mut points) = (0, 0);
+        for end in 1..=rough.len() {
+            points += if rough[end - 1] { levels[last].points(end - 1).len() } else { 0 };
+            if points >= self.batch || end == rough.len() && points > 0 {
+                reserve(&mut batches, 1, "the cubes")?;
+                batches.push((points, start..end));
+                (start, points) = (end, 0);
             }
-            if points > 0 {
-                let total = rough.len() as f64;
-                let stage = stage.part(start as f64 / total..end as f64 / total);
-                let finer = level.divided(rough, start..end, &stage.part(0.0..0.3))?;
-                levels.push(finer);
-                let chosen = choose(levels, &stage.part(0.3..0.4))?;
-                let finest = levels.len() - 1;
-                levels[finest].release_samples();
-                let rough = self.settle(levels, &chosen, division + 1, &stage.part(0.4..0.5))?;
-                drop(chosen);
-                self.divide(levels, division + 1, &rough, &stage.part(0.5..1.0))?;
-                levels.pop();
+        }
+        // The largest one last: then the points are not needed here any more. It may have nearly all, also of its own parts, and
+        // so on.
+        if let Some(largest) = (0..batches.len()).max_by_key(|&i| batches[i].0) {
+            batches[largest..].rotate_left(1);
+        }
+        let total: usize = batches.iter().map(|(points, _)| points).sum();
+        let (mut done, count) = (0, batches.len());
+        for (i, (points, batch)) in batches.into_iter().enumerate() {
+            let stage = stage.part(done as f64 / total as f64..(done + points) as f64 / total as f64);
+            done += points;
+            let finer = levels[last].divided(rough, batch, &stage.part(0.0..0.3))?;
+            if i + 1 == count {
+                levels[last].release_points();
             }
-            start = end;
+            levels.push(finer);
+            let chosen = choose(levels, &stage.part(0.3..0.4))?;
+            levels[last + 1].release_samples();
+            let rough = self.settle(levels, &chosen, division + 1, &stage.part(0.4..0.5))?;
+            drop(chosen);
+            self.divide(levels, division + 1, &rough, &stage.part(0.5..1.0))?;
+            levels.pop();
         }
         Ok(())
     }
