@@ -30,6 +30,8 @@ impl Normals {
     /// For `count` points, of which `expected` will be written; if these are not all, the others are zero.
     pub fn new(count: usize, expected: usize, curvature: bool) -> Result<Self, Error> {
         let normals = Filling::new(count, "the normals")?;
+        // Else nobody can ask for it.
+        let curvature = cfg!(feature = "full") && curvature;
         let curvature = curvature.then(|| Filling::new(count, "the curvature")).transpose()?;
         if expected < count {
             // SAFETY: each point belongs to one chunk, and nothing else is written meanwhile.
@@ -87,7 +89,7 @@ pub(crate) struct Writer<'a> {
 impl Writer<'_> {
     /// Whether the curvature of each point was asked for, and must be written too.
     pub fn has_curvature(&self) -> bool {
-        self.normals.curvature.is_some()
+        cfg!(feature = "full") && self.normals.curvature.is_some()
     }
 
     /// Takes the direction of the normal of a point, of either sign and of any length above [`SHORT`]; zero if nothing

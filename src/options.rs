@@ -88,9 +88,8 @@ impl Options {
     /// Refuses values out of range, and without the feature `full` what this build does not offer.
     pub fn validate(&self) -> Result<(), Error> {
         if !cfg!(feature = "full") {
-            let offered = Self { curvature: self.curvature, ..Self::default() };
-            let refusal = || Error::Unsupported("this build has the default options only, and curvature".into());
-            return if *self == offered { Ok(()) } else { Err(refusal()) };
+            let refusal = || Error::Unsupported("this build has the default options only".into());
+            return if *self == Self::default() { Ok(()) } else { Err(refusal()) };
         }
         match self.cell {
             Cell::Auto => {}

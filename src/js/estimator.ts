@@ -93,7 +93,7 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
       if (mine !== link) return;
       crash(
         answered
-          ? new BilinormalError('limit', `wasm broke, most likely for want of memory (${reason}); use fewer points`)
+          ? new BilinormalError('limit', `wasm broke, most likely for want of memory (${reason})`)
           : new BilinormalError('unsupported', `the worker did not start: ${reason}`),
       );
     };
@@ -128,6 +128,7 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
   async function run(options: ReadOptions, prepare: (tell: Job['tell']) => Call | Promise<Call>): Promise<any> {
     want(options, 'options', options, 'an object');
     const { signal, onProgress } = options;
+    want(!onProgress || onProgress.call, 'onProgress', onProgress, 'a function');
     signal?.throwIfAborted();
     let told = 0;
     const tell = (phase: string, fraction: number) => {
@@ -172,9 +173,9 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
   return { run, dispose };
 }
 
-/** Whether the core suffices, which knows no other method and no other cells. What is misspelt the full module refuses. */
-function isPlain({ method = 'bilinear', cell = 'auto', k, orient = 'none', components }: EstimateOptions) {
-  return method === 'bilinear' && cell === 'auto' && k === undefined && orient === 'none' && !components;
+/** Whether the core suffices, which has no choices. It refuses names that are misspelt, the full module other values. */
+function isPlain({ method = 'bilinear', cell = 'auto', orient = 'none', k, curvature, components }: EstimateOptions) {
+  return method === 'bilinear' && cell === 'auto' && orient === 'none' && k === undefined && !curvature && !components;
 }
 
 /** An estimator that starts a worker when a call needs one, and a call that does no more than that. */
@@ -203,7 +204,7 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
     readPointCloud: (source, options = {}) =>
       core.run(options, async (tell) => ({
         kind: 'read',
-        maxPoints: options.maxPoints,
+        maxPoints: options.maxPoints && Number(options.maxPoints),
         file: await resolve(source, host.files, tell, options.signal),
       })),
 

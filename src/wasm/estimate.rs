@@ -32,10 +32,12 @@ pub fn estimate(
     })?;
     let estimation = Object::new();
     set(&estimation, "normals", Buffer::from(normals));
-    if let Some(curvature) = curvature {
+    // Only the module with everything finds these, here and below; the other need not know how they are told.
+    if cfg!(feature = "full")
+        && let Some(curvature) = curvature
+    {
         set(&estimation, "curvature", Buffer::from(curvature));
     }
-    // Only the module with everything finds components, here and below; the other need not know how they are told.
     if cfg!(feature = "full")
         && let Some(components) = components
     {

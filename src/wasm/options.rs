@@ -11,16 +11,15 @@ const METHODS: &str = "'bilinear', 'knn' or 'egg'";
 const CELLS: &str = "'auto', { scale: number } or { size: number }";
 const ORIENTS: &str = "'none', 'consistent', 'outward', { viewpoint: [x, y, z] } or { up: [x, y, z] }";
 
-/// Reads the options; what is left out or `undefined` keeps its default. Ranges are the estimator's to check.
-///
-/// The core is asked only for what all have in common (`estimator.ts`).
+/// Reads the options, of which the core needs no more than the names (`estimator.ts`): what is left out or `undefined` keeps
+/// its default. Ranges are the estimator's to check.
 #[optimize(size)]
 pub(super) fn parse(value: &JsValue) -> Result<Options, Error> {
     let mut options = Options::default();
     if value.is_undefined() {
         return Ok(options);
     }
-    if !value.is_object() {
+    if cfg!(feature = "full") && !value.is_object() {
         return Err(refusal("options", value, "an object"));
     }
     for name in Object::keys(value.unchecked_ref::<Object>()).iter().filter_map(|name| name.as_string()) {
@@ -28,21 +27,22 @@ pub(super) fn parse(value: &JsValue) -> Result<Options, Error> {
             return Err(Error::Input(format!("option '{name}' is unknown; wanted any of {NAMES}")));
         }
     }
-    if cfg!(feature = "full") {
-        if let Some(method) = given(value, "method") {
-            options.method = self::method(&method).ok_or_else(|| refusal("method", &method, METHODS))?;
-        }
-        if let Some(cell) = given(value, "cell") {
-            options.cell = self::cell(&cell).ok_or_else(|| refusal("cell", &cell, CELLS))?;
-        }
-        if let Some(k) = given(value, "k") {
-            options.k = Some(self::k(&k).ok_or_else(|| refusal("k", &k, "a whole number of at least 3"))?);
-        }
-        if let Some(orient) = given(value, "orient") {
-            options.orient = self::orient(&orient).ok_or_else(|| refusal("orient", &orient, ORIENTS))?;
-        }
-        options.components = flag(value, "components")?;
+    if !cfg!(feature = "full") {
+        return Ok(options);
     }
+    if let Some(method) = given(value, "method") {
+        options.method = self::method(&method).ok_or_else(|| refusal("method", &method, METHODS))?;
+    }
+    if let Some(cell) = given(value, "cell") {
+        options.cell = self::cell(&cell).ok_or_else(|| refusal("cell", &cell, CELLS))?;
+    }
+    if let Some(k) = given(value, "k") {
+        options.k = Some(self::k(&k).ok_or_else(|| refusal("k", &k, "a whole number from 3 to 4294967295"))?);
+    }
+    if let Some(orient) = given(value, "orient") {
+        options.orient = self::orient(&orient).ok_or_else(|| refusal("orient", &orient, ORIENTS))?;
+    }
+    options.components = flag(value, "components")?;
     options.curvature = flag(value, "curvature")?;
     Ok(options)
 }
