@@ -54,7 +54,7 @@ function refuse({ positions: { buffer }, double, options }: Extract<Call, { kind
   }
   if (needed <= most) return;
   const numbers = `at least ${needed} bytes needed, ${most} available`;
-  const message = `${points} points do not fit into memory; use fewer points, or a 64-bit native build (${numbers})`;
+  const message = `${points} points do not fit into memory; use fewer (${numbers})`;
   throw Object.assign(coded('limit', message), { needed, available: most });
 }
 

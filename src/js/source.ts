@@ -8,7 +8,12 @@ export const kindOf = (value: unknown): string => Object.prototype.toString.call
 /** Throws an `input` error that says what came and what was wanted, unless all is well. */
 export function want(well: unknown, name: string, value: any, wanted: string): asserts well {
   if (well) return;
-  const came = Object(value) === value ? `${kindOf(value)}(${value.length ?? ''})` : value;
+  const came =
+    typeof value === 'string'
+      ? `'${value}'`
+      : Object(value) === value
+        ? `${kindOf(value)}(${value.length ?? ''})`
+        : value;
   throw new BilinormalError('input', `${name} is ${came}; wanted ${wanted}`);
 }
 

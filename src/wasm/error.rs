@@ -10,7 +10,7 @@ impl From<Error> for JsValue {
     fn from(error: Error) -> Self {
         let error = match error {
             Error::Limit { message, needed, available: None } => {
-                Error::Limit { message, needed, available: Some(memory::available()) }
+                Error::Limit { message, needed, available: Some(memory::available(needed)) }
             }
             error => error,
         };

@@ -15,6 +15,8 @@ static USED: AtomicUsize = AtomicUsize::new(0);
 static PEAK: AtomicUsize = AtomicUsize::new(0);
 /// Pages. At first all that a 32-bit module can address.
 static MAXIMUM: AtomicU32 = AtomicU32::new(65536);
+/// What could be had instead of the last block that was refused.
+static AVAILABLE: AtomicUsize = AtomicUsize::new(0);
 
 struct Counting;
 
@@ -24,17 +26,22 @@ fn aligned(layout: Layout) -> Layout {
     layout.align_to(8).unwrap_or(layout)
 }
 
-fn add(bytes: usize) {
-    PEAK.fetch_max(USED.fetch_add(bytes, Relaxed) + bytes, Relaxed);
+fn count(block: *mut u8, bytes: usize) {
+    if block.is_null() {
+        // At once: until somebody asks, what failed for want of it has given up its own.
+        let free = (u64::from(MAXIMUM.load(Relaxed)) * PAGE).saturating_sub(USED.load(Relaxed) as u64);
+        // It may lie in pieces.
+        AVAILABLE.store(free.min(bytes as u64 - 1) as usize, Relaxed);
+    } else {
+        PEAK.fetch_max(USED.fetch_add(bytes, Relaxed) + bytes, Relaxed);
+    }
 }
 
 // SAFETY: every call goes to the standard allocator, each block always with the same, possibly stricter, alignment.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let block = unsafe { System.alloc(aligned(layout)) };
-        if !block.is_null() {
-            add(layout.size());
-        }
+        count(block, layout.size());
         block
     }
 
@@ -45,9 +52,7 @@ unsafe impl GlobalAlloc for Counting {
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         let block = unsafe { System.alloc_zeroed(aligned(layout)) };
-        if !block.is_null() {
-            add(layout.size());
-        }
+        count(block, layout.size());
         block
     }
 }
@@ -68,8 +73,8 @@ pub fn set_maximum(pages: u32) {
     MAXIMUM.store(pages, Relaxed);
 }
 
-/// What could be had instead of a block that was refused.
-pub(super) fn available() -> u64 {
-    let free = (u64::from(MAXIMUM.load(Relaxed)) * PAGE).saturating_sub(USED.load(Relaxed) as u64);
-    free.min(LARGEST_BLOCK)
+/// What could be had at most instead of the block that was refused last.
+pub(super) fn available(needed: u64) -> u64 {
+    // Nobody asks for a larger one.
+    if needed > LARGEST_BLOCK { LARGEST_BLOCK } else { AVAILABLE.load(Relaxed) as u64 }
 }
