@@ -6,7 +6,7 @@ import { type FileHandle, open, readFile, realpath, rename, stat } from 'node:fs
 import { basename, dirname, join } from 'node:path';
 import { pathToFileURL } from 'node:url';
 import { parseArgs } from 'node:util';
-import { createEstimator } from './node.js';
+import { type BilinormalError, createEstimator } from './node.js';
 import { scannerOf } from './scanner.js';
 import type { EstimateOptions, PointCloud, Progress, Report, Source } from './types.js';
 
@@ -136,7 +136,12 @@ function parseOrient(value: string): Task['orient'] {
 async function run(task: Task): Promise<Report> {
   const source = await about(task.input, () => openInput(task.input));
   await about(task.output, () => checkFolder(task.output));
-  let estimator = await createEstimator({ threads: task.threads });
+  // Wrong options before the work, not after it.
+  let estimator = await usage(() => createEstimator({ threads: task.threads }));
+  const { orient } = task;
+  await usage(() =>
+    estimator.estimateNormals(new Float32Array(), { ...task.estimate, orient: orient === 'scanner' ? 'none' : orient }),
+  );
   const show = task.quiet || !process.stderr.isTTY ? undefined : showProgress;
   try {
     const { normals, curvature, report } = await about(task.input, async () => {
@@ -158,6 +163,16 @@ async function run(task: Task): Promise<Report> {
   } finally {
     estimator.dispose();
     if (show) process.stderr.write('\r\x1b[K');
+  }
+}
+
+/** Runs `work`; what it finds wrong with its arguments is wrong usage. */
+async function usage<T>(work: () => Promise<T>): Promise<T> {
+  try {
+    return await work();
+  } catch (error) {
+    const { code, message } = error as BilinormalError;
+    throw code === 'input' ? new UsageError(message) : error;
   }
 }
 
