@@ -57,7 +57,10 @@ export interface EstimateOptions {
 }
 
 export interface EstimateResult {
-  /** Unit length, or zero where a point is not finite or has no neighbours; as many numbers as `positions`. */
+  /**
+   * Unit length, or zero where a point is not finite or its neighbours lie along a line or in one place; as many numbers as
+   * `positions`.
+   */
   normals: Float32Array;
   /**
    * If asked for, the surface variation lambda3 / (lambda1 + lambda2 + lambda3) (Pauly, Gross and Kobbelt 2002), one
@@ -172,7 +175,7 @@ export interface EstimatorOptions {
   /** Default `'auto'`: one for each processor, at most 16. 1 is the single-threaded build. */
   threads?: number | 'auto';
   /**
-   * A folder that holds `single.wasm` and `threads.wasm`, and for `writePly`, `'knn'` and `'egg'` also
+   * A folder that holds `single.wasm` and `threads.wasm`, and for all but reading and the default options also
    * `single-full.wasm` and `threads-full.wasm` (this package exports them under these names), for those who host them
    * themselves. A relative address counts from the page; in Node, from the working directory.
    */

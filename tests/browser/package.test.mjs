@@ -1,7 +1,7 @@
 // The packed package in a browser, loaded in each way that API.md promises: plain files on the page's own origin, a
 // host on another origin, and a bundle; with and without isolation.
 import assert from 'node:assert/strict';
-import { mkdirSync, symlinkSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdirSync, readFileSync, symlinkSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { chromium } from 'playwright-core';
@@ -143,7 +143,7 @@ test('the point material shows what it says', async () => {
   const { build } = await import('vite');
   const folder = join(project, 'material');
   mkdirSync(folder);
-  symlinkSync(join(root, 'node_modules', 'three'), join(project, 'node_modules', 'three'), 'junction');
+  linkThree();
   writeFileSync(
     join(folder, 'index.html'),
     '<!doctype html><link rel="icon" href="data:," /><script type="module" src="main.js"></script>',
@@ -203,3 +203,48 @@ test('the point material shows what it says', async () => {
   assert.deepEqual(errors, []);
   await page.close();
 });
+
+test('what docs/embedding.md shows for three.js draws a file', async () => {
+  const { build } = await import('vite');
+  const folder = join(project, 'embedding');
+  mkdirSync(folder);
+  linkThree();
+  const [, shown] = /## three\.js\n+```js\n(.*?)```/s.exec(readFileSync(join(root, 'docs', 'embedding.md'), 'utf8'));
+  writeFileSync(
+    join(folder, 'index.html'),
+    '<!doctype html><link rel="icon" href="data:," /><script type="module" src="main.js"></script>',
+  );
+  writeFileSync(
+    join(folder, 'main.js'),
+    `${shown}
+    import { PerspectiveCamera, Scene, WebGLRenderer } from 'three';
+    import { writePly } from 'bilinormal';
+    window.draw = async (points) => {
+      const positions = Float32Array.from(points);
+      const scene = new Scene();
+      scene.add(await loadScan(await writePly({ count: points.length / 3, positions, origin: [0, 0, 0] }, {})));
+      const camera = new PerspectiveCamera(90, 1, 0.1, 10);
+      camera.position.z = 2;
+      const renderer = new WebGLRenderer();
+      renderer.setSize(64, 64);
+      renderer.render(scene, camera);
+      const gl = renderer.getContext();
+      const pixels = new Uint8Array(4 * 64 * 64);
+      gl.readPixels(0, 0, 64, 64, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+      return [32, 16].map((x) => pixels[4 * (32 * 64 + x)]);
+    };`,
+  );
+  await build({ root: folder, logLevel: 'error' });
+  const page = await browser.newPage();
+  await page.goto(await open(join(folder, 'dist'), ISOLATION));
+  await page.waitForFunction(() => window.draw);
+  const [middle, rim] = await page.evaluate((points) => window.draw(points), [...sphere(5000)]);
+  // Lit from the camera: brighter in the middle of a ball than towards its rim.
+  assert.ok(rim > 0 && middle > 1.2 * rim, `${middle} ${rim}`);
+  await page.close();
+});
+
+function linkThree() {
+  const link = join(project, 'node_modules', 'three');
+  if (!existsSync(link)) symlinkSync(join(root, 'node_modules', 'three'), link, 'junction');
+}
