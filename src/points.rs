@@ -132,12 +132,15 @@ pub(crate) fn starts(lengths: &[u32], what: &str) -> Result<Vec<usize>, Error> {
     Ok(starts)
 }
 
-/// Numbers below `count`, one from each of at most `most` strides of one length. A different place in each, so that the rows
-/// of a scan do not fall in step with them.
+/// Numbers below `count`, one from each of at most `most` strides of one length.
 pub(crate) fn spread(count: usize, most: usize) -> impl Iterator<Item = usize> {
     let step = count.div_ceil(most).max(1);
-    let place = move |i: usize| i * step + (i as u32).wrapping_mul(0x9E37_79B9) as usize % step;
-    (0..count.div_ceil(step)).map(move |i| place(i).min(count - 1))
+    (0..count.div_ceil(step)).map(move |stride| spread_in(stride, step, count))
+}
+
+/// That of one stride of `step` numbers. A different place in each, so that the rows of a scan do not fall in step with them.
+pub(crate) fn spread_in(stride: usize, step: usize, count: usize) -> usize {
+    (stride * step + (stride as u32).wrapping_mul(0x9E37_79B9) as usize % step).min(count - 1)
 }
 
 /// The box round all finite points.

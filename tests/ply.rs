@@ -301,14 +301,14 @@ fn a_binary_body_begins_right_after_the_header_whatever_its_bytes() {
 #[test]
 fn far_doubles_come_relative_to_an_origin() {
     let coordinates = |i: usize| [431_000.125 + i as f64, 4_580_000.5 + i as f64 * 0.25, 12.0];
-    let rows: Vec<Vec<V>> = (0..100).map(|i| coordinates(i).map(V::F64).to_vec()).collect();
+    let rows: Vec<Vec<V>> = (0..10_000).map(|i| coordinates(i).map(V::F64).to_vec()).collect();
     let mut files = in_all_formats(&["double x", "double y", "double z"], &rows).to_vec();
     let listed: Vec<Vec<V>> = rows.iter().map(|row| [&row[..], &[V::U8(1), V::U8(7)]].concat()).collect();
     files.extend(in_all_formats(&["double x", "double y", "double z", "list uchar uchar l"], &listed));
     let clouds: Vec<PointCloud> = files.iter().map(|file| read(file).unwrap()).collect();
     for cloud in &clouds {
         assert!(cloud.origin[0] > 431_000.0 && cloud.origin[1] > 4_580_000.0, "{:?}", cloud.origin);
-        for point in 0..100 {
+        for point in 0..10_000 {
             let found = [0, 1, 2].map(|axis| cloud.origin[axis] + f64::from(cloud.positions[3 * point + axis]));
             assert_eq!(found, coordinates(point));
         }

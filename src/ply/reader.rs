@@ -7,7 +7,7 @@ use super::scalar::bits;
 use super::{PointCloud, ReadOptions, tasks};
 use crate::error::Error;
 use crate::parallel::{self, Scatter};
-use crate::points::choose_origin;
+use crate::points::{choose_origin, spread_in};
 use crate::progress::Progress;
 use glam::DVec3;
 
@@ -125,7 +125,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Calls back with each value that is read, in every `step`th row of the element.
+    /// Calls back with each value that is read, in one of `step` rows of the element: those that a file of fixed rows is asked for.
     #[inline(never)]
     fn walk(&self, part: &Part, step: usize, each: &mut dyn FnMut(usize, &Column, f64)) -> Result<(), Error> {
         let vertex = self.vertex;
@@ -136,7 +136,7 @@ impl Reader<'_> {
         let mut cursor = part.cursor();
         for point in part.first..part.first + part.count {
             cursor.next_row();
-            if !point.is_multiple_of(step) {
+            if step > 1 && point != spread_in(point / step, step, self.count) {
                 cursor.skip_row(vertex)?;
                 continue;
             }
