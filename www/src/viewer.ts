@@ -265,8 +265,9 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   });
   canvas.addEventListener('dblclick', focus);
   canvas.addEventListener('keydown', (event) => {
-    if (event.key === '+' || event.key === '=') controls.dollyIn(1.1);
-    if (event.key === '-') controls.dollyOut(1.1);
+    // Against its documentation, dollyIn multiplies the distance.
+    if (event.key === '+' || event.key === '=') controls.dollyIn(1 / 1.1);
+    if (event.key === '-') controls.dollyOut(1 / 1.1);
   });
   canvas.addEventListener('webglcontextrestored', request);
   new ResizeObserver(resize).observe(canvas);
