@@ -260,10 +260,10 @@ test('curvature is computed to be shown, for the normals that are there, and sav
   await page.getByRole('radio', { name: 'Plain' }).check();
   const plain = await colorsShown(page, { side: 300 });
   await pressWhen('Computing normals and curvature', 'cancel');
-  await choice.check();
-  await page.waitForTimeout(500);
+  await choice.click();
+  const shaded = page.getByRole('radio', { name: 'Shaded' });
+  await page.waitForFunction(() => document.querySelector('input[value=shaded]').checked);
   assert.deepEqual(readSaved((await save(page)).bytes).length, 6 * 20_000, 'cancelled');
-  await page.getByRole('radio', { name: 'Plain' }).check();
   await choice.check();
   assert.equal((await result(page, 'ball.ply')).cubes, cubes);
   const bent = await colorsShown(page, { side: 300 });
@@ -281,8 +281,12 @@ test('curvature is computed to be shown, for the normals that are there, and sav
   await result(page, 'ball.ply');
   const coarse = readSaved((await save(page)).bytes, 'curvature');
   assert.ok(coarse[6] > 2 * saved[6], 'of larger cubes');
-  await page.getByRole('radio', { name: 'Shaded' }).check();
-  await again.click();
+  await shaded.check();
+  const open = await again.evaluate((button) => {
+    button.click();
+    return !document.querySelector('input[value=curvature]').disabled;
+  });
+  assert.ok(!open, 'what is computed without curvature has none to show');
   await result(page, 'ball.ply');
   assert.equal(readSaved((await save(page)).bytes).length, 6 * 20_000);
 });

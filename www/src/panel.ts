@@ -44,8 +44,8 @@ export function showState(store: Store): void {
     check('up', state.up);
     radio('shading', 'colors').disabled = !scan?.hasColors;
     radio('shading', 'shaded').disabled = radio('shading', 'normals').disabled = !scan?.hasNormals && !busy;
-    // To choose it starts a job, which must not end the one that runs.
-    const wait = !scan?.hasNormals || (busy && !scan.hasCurvature);
+    // To choose it may start a job, which must not end the one that runs.
+    const wait = !scan?.hasNormals || busy;
     radio('shading', 'curvature').disabled = wait && state.shading !== 'curvature';
     const backs = element<HTMLInputElement>('#backs');
     backs.checked = state.backs;

@@ -69,10 +69,14 @@ export function createSession(store: Store, viewer: Viewer): Session {
     } catch (error) {
       if (!mine.signal.aborted) store.set({ error: `${trouble}: ${messageOf(error)}` });
     }
-    if (current === mine) {
-      current = undefined;
-      store.set({ job: undefined });
-    }
+    if (current === mine) end();
+  }
+
+  function end(): void {
+    current = undefined;
+    const { scan, shading } = store.state;
+    // Curvature that did not come, because of an error or a cancel, is not what is shown.
+    store.set({ job: undefined, shading: shading === 'curvature' && !scan?.hasCurvature ? 'shaded' : shading });
   }
 
   async function show(file: File, step: Step): Promise<void> {
@@ -208,8 +212,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
 
     cancel() {
       current?.abort();
-      current = undefined;
-      store.set({ job: undefined });
+      end();
     },
   };
 }
