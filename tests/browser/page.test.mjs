@@ -620,6 +620,26 @@ test('a narrow screen shows everything without scrolling sideways', async () => 
   await page.screenshot({ path: join(ARTEFACTS, 'narrow-panel.png') });
 });
 
+test('a low window shows both buttons, and all that was measured by scrolling', async () => {
+  for (const [width, height] of [
+    [740, 360],
+    [640, 400],
+  ]) {
+    page = await browser.openPage(browser.isolated, { viewport: { width, height } });
+    const boxes = await Promise.all(
+      ['Drop a 3D scan', 'Choose a PLY file', 'Try the sample'].map((text) => page.getByText(text).boundingBox()),
+    );
+    for (const box of boxes) assert.ok(box.y >= 0 && box.y + box.height <= height, JSON.stringify(boxes));
+    await drop(page, 'ball.ply', spherePly(5_000));
+    await result(page, 'ball.ply');
+    await page.getByText('Time for each phase').click();
+    assert.ok((await page.locator('#status').boundingBox()).y >= 0);
+    await page.getByText('reading the file').scrollIntoViewIfNeeded();
+    await page.getByText('reading the file').click();
+    await page.close();
+  }
+});
+
 test('frames keep coming while the normals of a million points are computed', async () => {
   page = await browser.openPage(browser.isolated);
   await choose(page, 'large.ply', spherePly(1_000_000));
