@@ -181,11 +181,8 @@ test('a keyboard alone opens a file', async () => {
   page = await browser.openPage(browser.isolated);
   // Asked for early, because the browser takes a while to hand choosers over.
   const chosen = page.waitForEvent('filechooser');
-  const focused = () => page.evaluate(() => document.activeElement.textContent.trim());
-  for (let presses = 0; (await focused()) !== 'Choose a PLY file'; presses++) {
-    assert.ok(presses < 5, 'the button is not reached by Tab');
-    await page.keyboard.press('Tab');
-  }
+  await page.keyboard.press('Tab');
+  assert.equal(await page.evaluate(() => document.activeElement.textContent.trim()), 'Choose a PLY file');
   await page.keyboard.press('Enter');
   const chooser = await chosen;
   await chooser.setFiles({ name: 'ball.ply', mimeType: '', buffer: spherePly(5_000) });

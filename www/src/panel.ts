@@ -21,6 +21,7 @@ function fact(value: string, name: string): HTMLElement {
 
 export function showState(store: Store): void {
   const start = element('#start');
+  const canvas = element('#canvas');
   const panel = element<HTMLDetailsElement>('#panel');
   const unsupported = element('#unsupported');
   let drawn: State | undefined;
@@ -33,6 +34,8 @@ export function showState(store: Store): void {
 
     start.hidden = busy || scan !== undefined;
     panel.hidden = scan === undefined;
+    // Nothing to see takes no focus.
+    canvas.inert = scan === undefined;
     unsupported.hidden = state.unsupported === undefined;
     unsupported.textContent = state.unsupported ?? '';
     for (const button of document.querySelectorAll<HTMLButtonElement>('[data-do=choose], [data-do=sample]')) {
