@@ -669,6 +669,23 @@ test('a browser without WebGL 2 is told so', async () => {
   });
   await page.getByRole('alert').filter({ hasText: 'WebGL 2' }).waitFor();
   assert.ok(await page.getByRole('button', { name: 'Choose a PLY file' }).isDisabled());
+  // The browser would show a file that the page leaves to it.
+  const untaken = () => dispatchEvent(new DragEvent('drop', { cancelable: true }));
+  assert.equal(await page.evaluate(untaken), false);
+});
+
+test('a browser that has WebGL 2, and then does not start it, is told so', async () => {
+  page = await browser.openPage(browser.isolated, {
+    script: () => {
+      const original = HTMLCanvasElement.prototype.getContext;
+      HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+        return kind === 'webgl2' && this.id === 'canvas' ? null : original.call(this, kind, ...rest);
+      };
+    },
+  });
+  await page.getByRole('alert').filter({ hasText: 'did not start' }).waitFor();
+  assert.ok(await page.getByRole('button', { name: 'Choose a PLY file' }).isDisabled());
+  assert.ok(browser.surprises().every((text) => text.includes('Error creating WebGL context')));
 });
 
 const AERIAL = join(SCANS, 'las_ahn3_cropped.ply.gz');

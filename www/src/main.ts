@@ -11,9 +11,18 @@ const store = createStore();
 drawHero(element('#hero'));
 showState(store);
 
-const unsupported = await missing();
-if (unsupported === undefined) start(createViewer(element('#canvas')));
-store.set({ unsupported, ready: unsupported === undefined });
+// For a file that is dropped and not taken the browser leaves the page, also where the page can show nothing.
+for (const kind of ['dragover', 'drop']) addEventListener(kind, (event) => event.preventDefault());
+
+let unsupported = await missing();
+let viewer: Viewer | undefined;
+try {
+  if (!unsupported) viewer = createViewer(element('#canvas'));
+} catch {
+  unsupported = 'This page draws with WebGL 2, which did not start. It may after a restart of the browser.';
+}
+if (viewer) start(viewer);
+store.set({ unsupported, ready: viewer !== undefined });
 
 function start(viewer: Viewer): void {
   const session = createSession(store, viewer);
@@ -83,14 +92,12 @@ function takeDrops(session: Session): void {
   const carriesFiles = (event: DragEvent) => event.dataTransfer?.types.includes('Files') ?? false;
   const target = document.documentElement;
   addEventListener('dragover', (event) => {
-    event.preventDefault();
     target.classList.toggle('dropping', carriesFiles(event));
   });
   addEventListener('dragleave', (event) => {
     if (event.relatedTarget === null) target.classList.remove('dropping');
   });
   addEventListener('drop', (event) => {
-    event.preventDefault();
     target.classList.remove('dropping');
     const file = event.dataTransfer?.files[0];
     if (file) void session.open(file);

@@ -4,10 +4,10 @@ import { features } from 'bilinormal';
 /** The sentence to show, or undefined where everything is there. */
 export async function missing(): Promise<string | undefined> {
   if (!document.createElement('canvas').getContext('webgl2')) {
-    return 'This page draws with WebGL 2, which this browser has not or which is switched off.';
+    return 'This page draws with WebGL 2, which this browser does not have, or which is switched off.';
   }
   if (typeof WebAssembly === 'undefined') {
-    return 'This page computes with WebAssembly, which this browser has not or which is switched off.';
+    return 'This page computes with WebAssembly, which this browser does not have, or which is switched off.';
   }
   if (!(await features()).simd) {
     return 'This page needs WebAssembly SIMD: Chrome or Edge from 91, Firefox from 89, Safari from 16.4.';
