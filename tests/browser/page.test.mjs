@@ -688,6 +688,24 @@ test('a browser that has WebGL 2, and then does not start it, is told so', async
   assert.ok(browser.surprises().every((text) => text.includes('Error creating WebGL context')));
 });
 
+test('while WebGL is stopped the page says so, and then it draws again', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'ball.ply', spherePly(20_000));
+  await result(page, 'ball.ply');
+  const drawn = await colorsShown(page);
+  const stopped = await page.evaluateHandle(() => {
+    const extension = document.querySelector('#canvas').getContext('webgl2').getExtension('WEBGL_lose_context');
+    extension.loseContext();
+    return extension;
+  });
+  const told = page.getByRole('alert').filter({ hasText: 'WebGL' });
+  await told.waitFor();
+  await page.screenshot({ path: join(ARTEFACTS, 'lost.png') });
+  await stopped.evaluate((extension) => extension.restoreContext());
+  await told.waitFor({ state: 'hidden' });
+  assert.equal(await colorsShown(page), drawn);
+});
+
 const AERIAL = join(SCANS, 'las_ahn3_cropped.ply.gz');
 test('a real aerial scan of 849 thousand points', { skip: !existsSync(AERIAL) && 'no ../shared/data' }, async () => {
   page = await browser.openPage(browser.isolated);

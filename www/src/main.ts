@@ -59,6 +59,10 @@ function start(viewer: Viewer): void {
     if (event.key === 'b') store.set({ backs: !store.state.backs });
   });
 
+  const canvas = element('#canvas');
+  canvas.addEventListener('webglcontextlost', () => store.set({ lost: true }));
+  canvas.addEventListener('webglcontextrestored', () => store.set({ lost: false }));
+
   takeDrops(session);
   takeControls(session, viewer);
   takeTurns(session, viewer);

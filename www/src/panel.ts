@@ -42,6 +42,7 @@ export function showState(store: Store): void {
       button.disabled = !state.ready;
     }
 
+    element('#lost').hidden = !state.lost;
     element('#name').textContent = scan?.name ?? 'bilinormal';
     check('shading', state.shading);
     check('up', state.up);

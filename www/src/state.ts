@@ -38,6 +38,8 @@ export interface State extends OptionsForm, Turned {
   ready: boolean;
   /** Why this browser cannot run the page at all. */
   unsupported: string | undefined;
+  /** Whether the browser has taken WebGL away, which it may give back. */
+  lost: boolean;
   scan: Scan | undefined;
   report: Report | undefined;
   /** What the report is about. */
@@ -63,6 +65,7 @@ export function createStore(): Store {
   let state: State = {
     ready: false,
     unsupported: undefined,
+    lost: false,
     scan: undefined,
     report: undefined,
     used: undefined,
