@@ -133,6 +133,17 @@ test('a file dropped while another is worked on takes its place', async () => {
   assert.equal(await page.locator('#name').textContent(), 'small.ply');
 });
 
+test('of several files the first scan is taken, and folders are refused', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'ball.PLY', spherePly(5_000), ['photo.jpg']);
+  await page.waitForFunction(() => document.querySelector('#facts').childElementCount > 0);
+  assert.match((await result(page, 'ball.PLY')).error, /One file at a time .* ball\.PLY/);
+  // As a browser tells a folder, which cannot be made in a test.
+  await page.evaluate(() => (DataTransferItem.prototype.webkitGetAsEntry = () => ({ isDirectory: true })));
+  await drop(page, 'scans', Buffer.alloc(0));
+  assert.match((await result(page, 'ball.PLY')).error, /^Folders are not taken/);
+});
+
 test('a bad file gives a message that can be read, and the cloud before stays', async () => {
   page = await browser.openPage(browser.isolated);
   await drop(page, 'photo.ply', Buffer.from('GIF89a, not a scan'));

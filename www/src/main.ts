@@ -103,9 +103,14 @@ function takeDrops(session: Session): void {
   });
   addEventListener('drop', (event) => {
     target.classList.remove('dropping');
-    const file = event.dataTransfer?.files[0];
+    const items = [...(event.dataTransfer?.items ?? [])].filter(({ kind }) => kind === 'file');
+    const files = items.filter((item) => !item.webkitGetAsEntry()?.isDirectory).map((item) => item.getAsFile()!);
+    const file = files.find(({ name }) => /\.ply$/i.test(name)) ?? files[0];
     if (file) void session.open(file);
-    else store.set({ error: 'That was not a file: drop a .ply file from a folder of this machine.' });
+    if (items.length === 0)
+      store.set({ error: 'That was not a file: drop a .ply file from a folder of this machine.' });
+    else if (!file) store.set({ error: 'Folders are not taken: drop a .ply file from it.' });
+    else if (items.length > 1) store.set({ error: `One file at a time is shown: ${file.name} was taken.` });
   });
 }
 
