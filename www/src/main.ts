@@ -123,7 +123,9 @@ function takeTurns(session: Session, viewer: Viewer): void {
     const { turning, job } = store.state;
     const point = turning && !job ? viewer.pick(at) : -1;
     if (point >= 0) session.flipSurface(point);
+    return point;
   };
+  let turned = -1;
   let pressed = { x: NaN, y: NaN };
   let moved = 0;
   canvas.addEventListener('pointerdown', ({ clientX: x, clientY: y }) => {
@@ -134,8 +136,12 @@ function takeTurns(session: Session, viewer: Viewer): void {
     moved = Math.max(moved, Math.hypot(x - pressed.x, y - pressed.y));
   });
   canvas.addEventListener('click', ({ clientX: x, clientY: y, detail }) => {
-    // The second click of two centres the view.
-    if (detail < 2 && moved <= STILL) turn({ x, y });
+    if (detail < 2) turned = moved <= STILL ? turn({ x, y }) : -1;
+  });
+  canvas.addEventListener('dblclick', () => {
+    // Two clicks centre the view: what the first has turned is turned back.
+    if (turned >= 0) session.flipSurface(turned);
+    turned = -1;
   });
   canvas.addEventListener('keydown', ({ key, repeat }) => {
     if (key === 'Enter' && !repeat) turn();
