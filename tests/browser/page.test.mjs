@@ -167,8 +167,9 @@ test('a bad file gives a message that can be read, and the cloud before stays', 
 test('a file of one point ends too, without a normal', async () => {
   page = await browser.openPage(browser.isolated);
   await drop(page, 'one.ply', spherePly(1));
-  const { error, unresolved } = await result(page, 'one.ply');
-  assert.deepEqual({ error, unresolved }, { error: undefined, unresolved: 1 });
+  const { headline, error, unresolved, cube } = await result(page, 'one.ply');
+  assert.deepEqual({ error, unresolved, cube }, { error: undefined, unresolved: 1, cube: 1 });
+  assert.match(headline, /for 1 point: no normal was found$/);
 });
 
 test('points that are not finite and a stray one neither blank the view nor shrink the rest', async () => {
@@ -182,6 +183,7 @@ test('points that are not finite and a stray one neither blank the view nor shri
   const shown = await result(page, 'stray.ply');
   assert.equal(shown.error, undefined);
   assert.ok(shown.unresolved >= 2, `${shown.unresolved} unresolved`);
+  assert.match(await page.locator('#facts').innerText(), /99\.9% in the largest/);
   await page.getByRole('radio', { name: 'Normals' }).check();
   const colors = await colorsShown(page, { side: 300 });
   await page.screenshot({ path: join(ARTEFACTS, 'stray-normals.png') });
@@ -211,6 +213,8 @@ test('another cell, after a number that cannot be one', async () => {
   assert.equal(await field.getAttribute('aria-invalid'), 'true');
   assert.match(await page.locator('#problem').textContent(), /0\.1 to 100/);
   assert.ok(await again.isDisabled());
+  await field.fill('1,000');
+  assert.match(await page.locator('#problem').textContent(), /two ways/);
   await field.fill('3');
   await again.click();
   await page.waitForFunction(
@@ -221,7 +225,7 @@ test('another cell, after a number that cannot be one', async () => {
   assert.ok(coarse.cubes < auto.cubes / 2, `${coarse.cubes} cubes after ${auto.cubes}`);
 
   await page.getByRole('radio', { name: 'Edge' }).check();
-  await page.getByRole('textbox', { name: 'unit of the file' }).fill('0.05');
+  await page.getByRole('textbox', { name: 'unit of the file' }).fill('0,05');
   await page.keyboard.press('Enter');
   await page.waitForFunction(() => document.querySelector('#facts').textContent.includes('0.05 edge'));
 });
@@ -235,9 +239,9 @@ test('another method, after a k that cannot be one', async () => {
   const field = page.getByRole('textbox', { name: 'nearest points' });
   const again = page.getByRole('button', { name: 'Re-run' });
   assert.equal(await field.inputValue(), '16');
-  for (const text of ['2', '7.5', '']) {
+  for (const text of ['2', '7.5', '', '1e15']) {
     await field.fill(text);
-    assert.match(await page.locator('#problem').textContent(), /at least 3/);
+    assert.match(await page.locator('#problem').textContent(), /from 3 to 1,000,000/);
     assert.ok(await again.isDisabled(), text);
   }
   await field.fill('30');
@@ -344,9 +348,11 @@ test('normals are saved with the signs of the orientation that was chosen', asyn
     await page.getByRole('radio', { name: up, exact: true }).check();
     const { facts, saved } = await oriented('Up');
     assert.equal(shareOf(saved, rising(axis)), 1, up);
-    assert.match(facts, /upwards/);
+    assert.match(facts, new RegExp(`upwards\\s+along ${up}`));
     assert.doesNotMatch(facts, /surface/);
   }
+  await page.getByRole('radio', { name: 'Y', exact: true }).check();
+  assert.match(await page.locator('#facts').innerText(), /along Z/, 'as it was computed');
 });
 
 test('towards the camera no back faces show, wherever it is, and after a flip there is nothing else', async () => {

@@ -17,8 +17,14 @@ export function duration(milliseconds: number): string {
   return `${(milliseconds / 1000).toFixed(milliseconds < 10_000 ? 2 : 1)} s`;
 }
 
-/** "10 points", "1 point". */
-export const plural = (value: number, noun: string) => `${count(value)} ${noun}${value === 1 ? '' : 's'}`;
+/** "point" of one, else "points". */
+export const plural = (value: number, noun: string) => (value === 1 ? noun : `${noun}s`);
+
+/** "69.1%"; "100%" only of all. */
+export function percent(part: number, whole: number): string {
+  const share = (100 * part) / whole;
+  return `${measure(part < whole ? Math.min(share, 99.9) : share)}%`;
+}
 
 /** A phase as the report names it, in words: "cellSize" is "cell size". */
 export const phaseName = (phase: string) => phase.replace(/[A-Z]/g, (letter) => ` ${letter.toLowerCase()}`);

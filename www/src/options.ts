@@ -1,5 +1,6 @@
 // The options form: what was chosen and typed, as options of `estimateNormals` or as the reason why it cannot be such.
 import type { EstimateOptions } from 'bilinormal';
+import { count } from './format';
 import type { Up } from './viewer';
 
 export type CellKind = 'auto' | 'scale' | 'size';
@@ -28,18 +29,23 @@ export const METHODS: Record<Method, { name: string; k: number }> = {
 };
 
 const SCALE_RANGE = { least: 0.1, most: 100 };
-const LEAST_K = 3;
+/** The most is far beyond what is of use. */
+const K_RANGE = { least: 3, most: 1_000_000 };
 
 export type Parsed = { options: Pick<EstimateOptions, 'method' | 'cell' | 'k'> } | { problem: string };
 
 export function parseOptions({ method, cellKind, cellText, kText }: OptionsForm): Parsed {
+  if (method === 'bilinear' && cellKind === 'auto') return { options: { cell: 'auto' } };
+  const text = (method === 'bilinear' ? cellText : kText).trim();
+  // "1,000" is a thousand to some and one to others.
+  const ambiguous = /^[1-9]\d{0,2}(,\d{3})+(\.\d*)?$/;
+  if (ambiguous.test(text)) return { problem: `${text} can be read in two ways: write it without a comma.` };
+  const value = text === '' ? NaN : Number(text.replace(',', '.'));
   if (method !== 'bilinear') {
-    const k = numberOf(kText);
-    if (Number.isSafeInteger(k) && k >= LEAST_K) return { options: { method, k } };
-    return { problem: `k is a whole number of at least ${LEAST_K}.` };
+    const { least, most } = K_RANGE;
+    if (Number.isInteger(value) && value >= least && value <= most) return { options: { method, k: value } };
+    return { problem: `k is a whole number from ${count(least)} to ${count(most)}.` };
   }
-  if (cellKind === 'auto') return { options: { cell: 'auto' } };
-  const value = numberOf(cellText);
   if (cellKind === 'scale') {
     const { least, most } = SCALE_RANGE;
     if (value >= least && value <= most) return { options: { cell: { scale: value } } };
@@ -59,5 +65,3 @@ export function orientOf(kind: OrientKind, up: Up, eye: Place, scanner: Place | 
 
 /** Whether the normals were given one sign for each surface. */
 export const hasSurfaces = (orient: Orient | undefined) => orient === 'consistent' || orient === 'outward';
-
-const numberOf = (text: string) => (text.trim() === '' ? NaN : Number(text.trim().replace(',', '.')));

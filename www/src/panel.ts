@@ -1,6 +1,6 @@
 // Draws the state into the document. Nothing is remembered here: every part is a function of the state.
 import type { Report } from 'bilinormal';
-import { count, duration, measure, phaseName, plural } from './format';
+import { count, duration, measure, percent, phaseName, plural } from './format';
 import { METHODS, hasSurfaces, parseOptions } from './options';
 import type { State, Store } from './state';
 
@@ -18,6 +18,8 @@ function fact(value: string, name: string): HTMLElement {
   item.prepend(make('b', value));
   return item;
 }
+
+const counted = (value: number, noun: string) => fact(count(value), plural(value, noun));
 
 export function showState(store: Store): void {
   const start = element('#start');
@@ -134,14 +136,14 @@ function factsOf(report: Report, used: State['used']): HTMLElement[] {
     // Without a surface no size was chosen.
     const edges = (report.scales ?? []).map(({ cellSize }) => measure(cellSize));
     return [
-      fact(count(report.cells), 'cubes'),
+      counted(report.cells, 'cube'),
       ...(edges.length ? [fact([...new Set([edges[0]!, edges.at(-1)!])].join(' to '), 'edge')] : []),
       fact(measure(report.noise), 'noise'),
     ];
   }
   return [
-    fact(count(report.cells), 'cubes'),
-    fact(count(report.nodes), 'nodes'),
+    counted(report.cells, 'cube'),
+    counted(report.nodes, 'node'),
     fact(measure(report.cellSize), `edge, ${measure(report.scale)} L`),
   ];
 }
@@ -157,20 +159,20 @@ const WAYS = {
 function signsOf({ components, points }: Report, { scan, used, flipped, turnedSurfaces }: State): HTMLElement[] {
   if (components) {
     const [largest] = components.largest;
-    const facts = [fact(count(components.count), components.count === 1 ? 'surface' : 'surfaces')];
+    const facts = [counted(components.count, 'surface')];
     if (!largest) return facts;
     const { side, confidence } = largest;
     const [way, opposite] = WAYS[side];
     const turned = turnedSurfaces.size;
     return [
       ...facts,
-      fact(`${measure((100 * largest.points) / points)}%`, 'in the largest'),
+      fact(percent(largest.points, points), 'in the largest'),
       fact(flipped === turnedSurfaces.has(0) ? way : opposite, `with confidence ${confidence.toFixed(2)}`),
       ...(turned ? [fact(count(turned), 'flipped by hand')] : []),
     ];
   }
   if (typeof used?.orient !== 'object') return [];
-  if ('up' in used.orient) return [fact(flipped ? 'downwards' : 'upwards', 'throughout')];
+  if ('up' in used.orient) return [fact(flipped ? 'downwards' : 'upwards', `along ${used.orient.up[2] ? 'Z' : 'Y'}`)];
   const way = flipped ? 'away from' : 'towards';
   if (used.orient.viewpoint === scan?.scanner) return [fact(`${way} the scanner`, 'as the file says')];
   return [fact(`${way} the camera`, 'as it was')];
@@ -181,7 +183,10 @@ function showResult(state: State): void {
   element('#status').hidden = scan === undefined;
   if (!scan) return;
   element('#total').textContent = report ? duration(report.milliseconds.total) : count(scan.points);
-  element('#total-label').textContent = report ? `for ${plural(report.points, 'point')}` : 'points, without normals';
+  const points = plural(scan.points, 'point');
+  const none = report?.unresolved === scan.points ? ': no normal was found' : '';
+  const label = report ? `for ${count(scan.points)} ${points}${none}` : `${points}, without normals`;
+  element('#total-label').textContent = label;
 
   const facts = element('#facts');
   facts.replaceChildren();
@@ -195,7 +200,7 @@ function showResult(state: State): void {
     ...factsOf(report, used),
     ...signsOf(report, state),
     fact(count(report.unresolved), 'unresolved'),
-    fact(count(report.threads), report.threads === 1 ? 'thread' : 'threads'),
+    counted(report.threads, 'thread'),
   );
   facts.dataset['mode'] = report.mode;
 
