@@ -387,13 +387,17 @@ test('towards the camera no back faces show, wherever it is, and after a flip th
   assert.equal(await backsShown(page, square), 0);
 });
 
-test('plus enlarges the cloud, minus makes it smaller', async () => {
+test('plus enlarges the cloud, minus makes it smaller, F fits it, B shows back faces', async () => {
   page = await browser.openPage(browser.isolated);
+  await page.keyboard.press('b');
   await drop(page, 'ball.ply', spherePly(20_000));
   await result(page, 'ball.ply');
   // A ball that has only back faces is told from the background by their colour.
   await page.getByRole('button', { name: 'Flip all' }).click();
-  await page.getByRole('checkbox', { name: 'Back faces' }).check();
+  const backs = page.getByRole('checkbox', { name: 'Back faces' });
+  assert.ok(!(await backs.isChecked()), 'before there was a scan');
+  await page.keyboard.press('Shift+B');
+  assert.ok(await backs.isChecked());
   const share = () => backsShown(page, { side: 780 });
   const before = await share();
   await page.locator('#canvas').focus();
@@ -402,6 +406,8 @@ test('plus enlarges the cloud, minus makes it smaller', async () => {
   for (let presses = 1; presses <= 2; presses++) await page.keyboard.press('+');
   const larger = await share();
   assert.ok(smaller < 0.9 * before && larger > 1.1 * before, `${smaller}, ${before}, ${larger} of the view`);
+  await page.keyboard.press('Shift+F');
+  assert.equal(await share(), before);
 });
 
 test('where the file says that the scanner stood is offered as a viewpoint', async () => {

@@ -55,8 +55,10 @@ function start(viewer: Viewer): void {
     }
     const typing = event.target instanceof HTMLInputElement && event.target.type === 'text';
     if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
-    if (event.key === 'f') viewer.fit();
-    if (event.key === 'b') store.set({ backs: !store.state.backs });
+    const key = event.key.toLowerCase();
+    if (key === 'f') viewer.fit();
+    // The box does nothing while it is disabled.
+    if (key === 'b') element('#backs').click();
   });
 
   const canvas = element('#canvas');
