@@ -61,10 +61,10 @@ export async function openBrowser() {
 }
 
 /**
- * A binary PLY of unit spheres, evenly covered in a random order, one point after the other on each in turn; `colored` adds
- * red, green, blue.
+ * A binary PLY of spheres, evenly covered in a random order, one point after the other on each in turn; `colored` adds
+ * red, green, blue. `centres` are in radii.
  */
-export function spherePly(points, { colored = false, centres = [[0, 0, 0]] } = {}) {
+export function spherePly(points, { colored = false, centres = [[0, 0, 0]], radius = 1 } = {}) {
   const colors = colored ? 'property uchar red\nproperty uchar green\nproperty uchar blue\n' : '';
   const header = Buffer.from(
     `ply\nformat binary_little_endian 1.0\nelement vertex ${points}\n` +
@@ -80,9 +80,9 @@ export function spherePly(points, { colored = false, centres = [[0, 0, 0]] } = {
     const turn = 2 * Math.PI * random();
     const ring = Math.sqrt(1 - z * z);
     const centre = centres[i % centres.length];
-    file.writeFloatLE(centre[0] + ring * Math.cos(turn), at);
-    file.writeFloatLE(centre[1] + ring * Math.sin(turn), at + 4);
-    file.writeFloatLE(centre[2] + z, at + 8);
+    file.writeFloatLE(radius * (centre[0] + ring * Math.cos(turn)), at);
+    file.writeFloatLE(radius * (centre[1] + ring * Math.sin(turn)), at + 4);
+    file.writeFloatLE(radius * (centre[2] + z), at + 8);
     if (colored) file.set([255 * (i % 2), 96, 160], at + 12);
   }
   return file;

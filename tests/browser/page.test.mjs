@@ -410,6 +410,27 @@ test('plus enlarges the cloud, minus makes it smaller, F fits it, B shows back f
   assert.equal(await share(), before);
 });
 
+test('a cloud in any unit is lit, moved and picked alike', async () => {
+  page = await browser.openPage(browser.isolated);
+  for (const radius of [1e-19, 1e-3, 1e19]) {
+    await drop(page, `${radius}.ply`, spherePly(60_000, { radius, centres: [[-10, 4, -3]] }));
+    await result(page, `${radius}.ply`);
+    const square = { side: 300 };
+    await page.getByRole('checkbox', { name: 'Back faces' }).check();
+    // A few of the far side are seen through the near one.
+    assert.ok((await backsShown(page, square)) < 0.05, `${radius}`);
+    const still = await page.screenshot();
+    await page.locator('#canvas').focus();
+    await page.keyboard.press('ArrowLeft');
+    await colorsShown(page);
+    assert.ok(!still.equals(await page.screenshot()), `moved at ${radius}`);
+    await page.getByRole('button', { name: 'Flip one' }).click();
+    await page.locator('#canvas').press('Enter');
+    assert.match(await page.locator('#facts').innerText(), /\b1 flipped by hand/, `${radius}`);
+    assert.ok((await backsShown(page, square)) > 0.9, `${radius}`);
+  }
+});
+
 test('where the file says that the scanner stood is offered as a viewpoint', async () => {
   page = await browser.openPage(browser.isolated);
   const ball = spherePly(20_000);

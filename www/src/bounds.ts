@@ -39,7 +39,7 @@ export function boundsOf(positions: Float32Array): Bounds {
   const extent = low.map((value, axis) => high[axis]! - value) as Bounds['extent'];
 
   let squaredReach = 0;
-  const squares = new Float32Array(Math.ceil(points / step));
+  const squares = new Float64Array(Math.ceil(points / step));
   let sampled = 0;
   for (let i = 0; i < points; i++) {
     const x = positions[3 * i]! - centre[0];

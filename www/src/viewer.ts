@@ -82,7 +82,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   controls.listenToKeyEvents(canvas);
 
   const scene = new Scene();
-  // The world is y-up, with the middle of the cloud at its origin; this turns a z-up cloud into it.
+  // The world is y-up, with the middle of the cloud at its origin and its bulk in the unit ball, because OrbitControls
+  // takes no notice of movements below a length of its own; this turns and scales the cloud into it.
   const turned = new Group();
   scene.add(turned);
   // Warm and with little light on edges, so that form stands out against both backgrounds.
@@ -93,8 +94,18 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   points.visible = false;
   turned.add(points);
 
+  const prepare = material.onBeforeRender.bind(material);
+  material.onBeforeRender = (to) => {
+    prepare(to);
+    // It turns what is in the unit of the world; with the scale in it the squares of lengths would leave single precision
+    // where the unit of the file is far from that.
+    points.normalMatrix.multiplyScalar(turned.scale.x);
+  };
+
   let cloud: Cloud | undefined;
   let bounds: Bounds | undefined;
+  /** How far the cloud reaches in the world. */
+  let reach = 1;
   let whole = points.geometry;
   let sparse: BufferGeometry | undefined;
   /** One of these two is the attribute `color`. */
@@ -149,20 +160,19 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   }
 
   function setDepthRange(): void {
-    if (!bounds) return;
     const away = camera.position.length();
     const focus = camera.position.distanceTo(controls.target);
-    camera.near = Math.max(away - bounds.reach, focus * 0.01, bounds.radius * 1e-4);
-    camera.far = Math.max(away + bounds.reach * 1.01, camera.near * 2);
+    camera.near = Math.max(away - reach, focus * 0.01, 1e-4);
+    camera.far = Math.max(away + reach * 1.01, camera.near * 2);
     camera.updateProjectionMatrix();
   }
 
   /** Size of a point in world units, and larger where a part of the cloud has to stand for the whole. */
   function setSize(drawn: number): void {
-    if (!cloud || !bounds) return;
+    if (!cloud) return;
     // The surface of a scan has about as much area as the sphere round it; points without order need 2.2 times the
     // spacing of an even pattern to close it.
-    const spacing = 2.2 * bounds.radius * Math.sqrt((4 * Math.PI) / Math.max(1, cloud.positions.length / 3));
+    const spacing = 2.2 * Math.sqrt((4 * Math.PI) / Math.max(1, cloud.positions.length / 3));
     material.size = pointSize * spacing * Math.min(2, Math.sqrt(1 / drawn));
   }
 
@@ -198,19 +208,19 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     const box = new Vector3(x, y, z).applyEuler(turned.rotation);
     const flat = 1 - Math.min(1, Math.abs(box.y) / Math.max(Math.abs(box.x), Math.abs(box.z), Number.MIN_VALUE));
     const direction = new Vector3(0.5, 0.36 + 0.45 * flat, 1).normalize();
-    const distance = 1.06 * framingDistance(direction, box.multiplyScalar(0.5), bounds.radius);
+    const distance = 1.06 * framingDistance(direction, box.multiplyScalar(0.5 / bounds.radius));
     controls.target.set(0, 0, 0);
     camera.position.copy(direction).multiplyScalar(distance);
-    controls.minDistance = bounds.radius * 1e-3;
-    controls.maxDistance = Math.max(bounds.reach, distance) * 20;
+    controls.minDistance = 1e-3;
+    controls.maxDistance = Math.max(reach, distance) * 20;
     controls.update();
     // A jump, not a movement: draw all of it at once.
     lastMove = -Infinity;
     request();
   }
 
-  /** How far away, looking along `direction`, the box (half edges) or the ball round it just fills the free window. */
-  function framingDistance(direction: Vector3, half: Vector3, radius: number): number {
+  /** How far away, looking along `direction`, the box (half edges) or the unit ball just fills the free window. */
+  function framingDistance(direction: Vector3, half: Vector3): number {
     const { clientWidth: width, clientHeight: height } = canvas;
     const slope = Math.tan((camera.fov * Math.PI) / 360) / height;
     const across = slope * Math.max(width - margins.left - margins.right, width / 4);
@@ -223,7 +233,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       const beside = Math.max(Math.abs(at.dot(right)) / across, Math.abs(at.dot(above)) / upright);
       distance = Math.max(distance, beside + at.dot(direction));
     }
-    return Math.min(distance || Infinity, radius / Math.sin(Math.atan(Math.min(across, upright))));
+    return Math.min(distance || Infinity, 1 / Math.sin(Math.atan(Math.min(across, upright))));
   }
 
   function resize(): void {
@@ -293,6 +303,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       }
       points.geometry = whole;
       points.visible = true;
+      turned.scale.setScalar(1 / bounds.radius);
+      reach = bounds.reach / bounds.radius;
       points.position.set(-bounds.centre[0], -bounds.centre[1], -bounds.centre[2]);
       chooseShading();
       viewer.setUp(up);
