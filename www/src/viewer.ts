@@ -68,6 +68,8 @@ const FAST_FRAME = 20;
 const SLOW_FRAME = 36;
 /** Time without movement after which the whole cloud is drawn. */
 const STILL = 140;
+/** Most that a point measures without a choice of its size, where the bulk of the cloud has radius 1. */
+const LARGEST = 0.2;
 
 export function createViewer(canvas: HTMLCanvasElement): Viewer {
   const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
@@ -171,9 +173,9 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   function setSize(drawn: number): void {
     if (!cloud) return;
     // The surface of a scan has about as much area as the sphere round it; points without order need 2.2 times the
-    // spacing of an even pattern to close it.
+    // spacing of an even pattern to close it. A few points are dots, not a surface.
     const spacing = 2.2 * Math.sqrt((4 * Math.PI) / Math.max(1, cloud.positions.length / 3));
-    material.size = pointSize * spacing * Math.min(2, Math.sqrt(1 / drawn));
+    material.size = pointSize * Math.min(spacing, LARGEST) * Math.min(2, Math.sqrt(1 / drawn));
   }
 
   /** New values of an attribute, in the buffer that it has on the graphics card. */
