@@ -736,6 +736,25 @@ test('a browser that has WebGL 2, and then does not start it, is told so', async
   assert.ok(browser.surprises().every((text) => text.includes('Error creating WebGL context')));
 });
 
+test('a window that is zoomed gets a picture of as many pixels', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'ball.ply', spherePly(5_000));
+  await result(page, 'ball.ply');
+  const session = await page.context().newCDPSession(page);
+  // As a window is zoomed: the emulation tells the page nothing where only the pixels change.
+  for (const [width, deviceScaleFactor] of [
+    [640, 2],
+    [800, 1.5],
+  ]) {
+    const metrics = { width, height: 600, deviceScaleFactor, mobile: false };
+    await session.send('Emulation.setDeviceMetricsOverride', metrics);
+    await page.waitForFunction(
+      (pixels) => document.querySelector('#canvas').width === pixels,
+      width * deviceScaleFactor,
+    );
+  }
+});
+
 test('while WebGL is stopped the page says so, and then it draws again', async () => {
   page = await browser.openPage(browser.isolated);
   await drop(page, 'ball.ply', spherePly(20_000));

@@ -74,7 +74,6 @@ const LARGEST = 0.2;
 export function createViewer(canvas: HTMLCanvasElement): Viewer {
   const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
   const renderer = new WebGLRenderer({ canvas, alpha: true, antialias: false, powerPreference: 'high-performance' });
-  renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
   const camera = new PerspectiveCamera(38, 1, 0.01, 100);
   camera.position.set(0, 0, 3);
   const controls = new OrbitControls(camera, canvas);
@@ -241,12 +240,23 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   function resize(): void {
     const { clientWidth: width, clientHeight: height } = canvas;
     if (width === 0 || height === 0) return;
+    renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     renderer.setSize(width, height, false);
     camera.aspect = width / height;
     // The middle of what is not covered is the middle of the view.
     const { top, right, bottom, left } = margins;
     camera.setViewOffset(width, height, (right - left) / 2, (bottom - top) / 2, width, height);
     request();
+  }
+
+  /** The window was zoomed, or moved to a screen of other pixels: its size may stay the same. */
+  function followPixelRatio(): void {
+    const same = matchMedia(`(resolution: ${devicePixelRatio}dppx)`);
+    const change = () => {
+      resize();
+      followPixelRatio();
+    };
+    same.addEventListener('change', change, { once: true });
   }
 
   function pick(at?: { x: number; y: number }): number {
@@ -283,6 +293,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   });
   canvas.addEventListener('webglcontextrestored', request);
   new ResizeObserver(resize).observe(canvas);
+  followPixelRatio();
 
   const viewer: Viewer = {
     show(next, nextBounds, up) {
