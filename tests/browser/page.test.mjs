@@ -117,8 +117,15 @@ test('a job can be cancelled while it reads and while it computes, and the next 
   await page.getByText('1,000,000 points, without normals').waitFor();
   await page.locator('#job').waitFor({ state: 'hidden' });
   assert.ok(await page.getByRole('button', { name: 'Save as PLY' }).isDisabled());
-  await page.getByRole('button', { name: 'Compute' }).click();
+  const compute = page.getByRole('button', { name: 'Compute' });
+  await compute.press('Enter');
+  // Out of use while it runs, but still in focus: Enter does not begin anew.
+  await page.waitForFunction(() => document.querySelector('#job progress').value > 0);
+  assert.ok(await compute.isDisabled());
+  await page.keyboard.press('Enter');
+  assert.ok((await page.locator('#job progress').getAttribute('value')) > 0);
   assert.match((await result(page, 'large.ply')).headline, /1,000,000 points/);
+  assert.equal(await page.evaluate(() => document.activeElement.textContent), 'Re-run');
 
   await drop(page, 'small.ply', spherePly(5_000));
   assert.match((await result(page, 'small.ply')).headline, /5,000 points/);

@@ -35,7 +35,9 @@ function start(viewer: Viewer): void {
     fit: () => viewer.fit(),
     flip: () => session.flip(),
     turn: () => store.set({ turning: !store.state.turning }),
-    save: () => void session.save(),
+    save: () => {
+      if (!store.state.job) void session.save();
+    },
     cancel: () => session.cancel(),
     dismiss: () => store.set({ error: undefined }),
   };
@@ -176,7 +178,7 @@ function takeControls(session: Session, viewer: Viewer): void {
   k.addEventListener('input', () => store.set({ kText: k.value }));
   element<HTMLFormElement>('#options').addEventListener('submit', (event) => {
     event.preventDefault();
-    void session.estimate();
+    if (!store.state.job) void session.estimate();
   });
 
   let before = store.state;

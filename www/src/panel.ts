@@ -63,7 +63,9 @@ export function showState(store: Store): void {
     turn.disabled = !hasSurfaces(state.used?.orient) || busy;
     turn.setAttribute('aria-pressed', String(state.turning));
     document.documentElement.classList.toggle('turning', state.turning && !turn.disabled);
-    element<HTMLButtonElement>('[data-do=save]').disabled = !scan?.hasNormals || busy;
+    const save = element<HTMLButtonElement>('[data-do=save]');
+    save.disabled = !scan?.hasNormals;
+    rest(save, busy);
 
     showOptions(state, busy);
     showError(error);
@@ -76,6 +78,9 @@ export function showState(store: Store): void {
     if (!told) showResult(state);
   });
 }
+
+/** What starts a job does nothing while one runs, but keeps the focus of the keyboard. */
+const rest = (button: HTMLButtonElement, busy: boolean) => button.setAttribute('aria-disabled', String(busy));
 
 const radio = (name: string, value: string) => element<HTMLInputElement>(`input[name="${name}"][value="${value}"]`);
 
@@ -109,7 +114,8 @@ function showOptions(state: State, busy: boolean): void {
   note.hidden = problem === '';
   note.textContent = problem;
   const again = element<HTMLButtonElement>('#again');
-  again.disabled = busy || problem !== '';
+  again.disabled = problem !== '';
+  rest(again, busy);
   again.textContent = scan?.hasNormals ? 'Re-run' : 'Compute';
 }
 
