@@ -48,6 +48,9 @@ void main() {
   vec4 mvPosition = modelViewMatrix * vec4(position, 1.0);
   // In the space of the normals, so that the fragment needs no matrix; zero normals stay zero.
   vToCamera = (isOrthographic ? vec3(0.0, 0.0, 1.0) : -mvPosition.xyz) * normalMatrix;
+  // Whatever the unit is, the fragment can square it.
+  vec3 along = abs(vToCamera);
+  vToCamera /= max(max(along.x, along.y), max(along.z, 1e-37));
   gl_Position = projectionMatrix * mvPosition;
   gl_PointSize = max(size * 0.5 * viewportHeight * projectionMatrix[1][1] / gl_Position.w, pixels * pixelRatio);
   #include <logdepthbuf_vertex>

@@ -95,14 +95,6 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   points.visible = false;
   turned.add(points);
 
-  const prepare = material.onBeforeRender.bind(material);
-  material.onBeforeRender = (to) => {
-    prepare(to);
-    // It turns what is in the unit of the world; with the scale in it the squares of lengths would leave single precision
-    // where the unit of the file is far from that.
-    points.normalMatrix.multiplyScalar(turned.scale.x);
-  };
-
   let cloud: Cloud | undefined;
   let bounds: Bounds | undefined;
   /** How far the cloud reaches in the world. */
