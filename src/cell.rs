@@ -63,10 +63,8 @@ pub(crate) struct Density {
     pub middle: DVec3,
     /// Points of the cloud.
     count: usize,
-    /// The edge of the first cubes.
-    edge: f64,
-    /// Points in an occupied cube of that edge, and of halves of it; 0 for one point, or hardly any that is finite.
-    occupancy: Levels,
+    /// Edges, from large to small, and the points in an occupied cube of each; 0 for one point, or hardly any that is finite.
+    occupancy: Vec<(f64, f64)>,
 }
 
 impl Density {
@@ -82,38 +80,47 @@ impl Density {
         let count = bounds.finite;
         if extent <= 0.0 || bulk.sample.is_empty() {
             let edge = paper_edge(bounds.extent(), count);
-            return Ok(Self { middle: bulk.median, count, edge, occupancy: [0.0; LEVELS as usize + 1] });
+            return Ok(Self { middle: bulk.median, count, occupancy: vec![(edge, 0.0)] });
         }
-        let mut probes = Probes::place(&bulk, extent, count);
-        let mut occupancy = probes.count(points)?;
-        // Where most of the box is empty even their last halves hold many points: on from there, unless these coincide.
-        while occupancy[LEVELS as usize] > CROWDED {
-            let smaller = Probes::place(&bulk, probes.edge * exp2(-f64::from(LEVELS)), count);
-            let counted = smaller.count(points)?;
-            if counted[LEVELS as usize] > 0.9 * occupancy[LEVELS as usize] {
+        let (mut occupancy, mut extent): (Vec<(f64, f64)>, f64) = (Vec::new(), extent);
+        loop {
+            let probes = Probes::place(&bulk, extent, count);
+            let counts = probes.count(points)?;
+            let least = counts[LEVELS as usize];
+            if occupancy.last().is_some_and(|&(_, last)| least > 0.5 * last) {
+                // What the halves before could not part are copies of each other.
                 break;
             }
-            (probes, occupancy) = (smaller, counted);
+            let edge_of = |halvings: u32| probes.edge * exp2(-f64::from(halvings));
+            occupancy.extend((0..).zip(counts).map(|(halvings, count)| (edge_of(halvings), count)));
+            // Where most of the box is empty even the last halves hold many points: on from there.
+            if least <= CROWDED || least.is_nan() {
+                break;
+            }
+            extent = edge_of(LEVELS);
         }
-        Ok(Self { middle: bulk.median, count, edge: probes.edge, occupancy })
+        Ok(Self { middle: bulk.median, count, occupancy })
     }
 
     /// The edge of cubes that hold about `wanted` points each.
     #[optimize(size)]
     pub fn edge(&self, wanted: f64) -> f64 {
+        let (mut edge, mut count) = self.occupancy[0];
         // Points that coincide can't be told apart by any edge, so they count as one.
         let wanted = wanted.min(self.count as f64 / LEAST_CELLS).max(LEAST_POINTS_PER_CELL);
-        let target = wanted * self.occupancy[LEVELS as usize];
-        let Some(level) = self.occupancy.iter().position(|&count| count < target) else {
-            return self.edge;
-        };
-        if level == 0 {
+        let target = wanted * self.occupancy[self.occupancy.len() - 1].1;
+        if count < target {
             // A probe is too small already. On a surface the points of a cube grow with its edge squared.
-            return self.edge * (target / self.occupancy[0]).sqrt();
+            return edge * (target / count).sqrt();
         }
-        let (coarse, fine) = (self.occupancy[level - 1], self.occupancy[level]);
-        let share = log2(coarse / target) / log2(coarse / fine);
-        self.edge * exp2(1.0 - level as f64 - share)
+        for &(smaller, fewer) in &self.occupancy {
+            if fewer < target {
+                let share = log2(count / target) / log2(count / fewer);
+                return edge * exp2(share * log2(smaller / edge));
+            }
+            (edge, count) = (smaller, fewer);
+        }
+        edge
     }
 }
 
