@@ -135,7 +135,7 @@ impl Run<'_> {
         stage: &Stage,
     ) -> Result<Vec<bool>, Error> {
         let level = &levels[levels.len() - 1];
-        let vote = Vote { level, chosen, is_last: division == DIVISIONS, normals: self.normals };
+        let vote = Vote { level, chosen, division, normals: self.normals };
         let (rough, counts) = vote.run(stage)?;
         for (_, chosen) in chosen.iter().enumerate().filter(|&(cube, _)| level.is_wanted(cube) && !rough[cube]) {
             self.cubes += 1;

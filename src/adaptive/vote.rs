@@ -1,11 +1,11 @@
 //! The normals of the points, from the surfaces of the cubes round them.
 
-use super::SIZES;
 use super::around::Around;
 use super::choose::{Chosen, MISFIT};
 use super::level::Level;
 use super::matrix::{dot_lanes, times_lanes};
 use super::surface::Surface;
+use super::{DIVISIONS, SIZES};
 use crate::error::Error;
 use crate::grid::Placed;
 use crate::lanes::{inverse_root, load, root, transposed};
@@ -49,8 +49,8 @@ const WITHIN: f32 = 0.8;
 pub(super) struct Vote<'a> {
     pub level: &'a Level,
     pub chosen: &'a [Chosen],
-    /// Whether no cube is divided any more.
-    pub is_last: bool,
+    /// How often the cubes were divided.
+    pub division: usize,
     pub normals: &'a Normals,
 }
 
@@ -99,9 +99,9 @@ impl<'a> Task<'a> {
     #[optimize(size)]
     #[inline(never)]
     fn settle(&mut self, brick: usize, cube: usize, bit: u32) -> bool {
-        let Vote { level, chosen, is_last, .. } = *self.vote;
+        let Vote { level, chosen, division, .. } = *self.vote;
         let (own, surface) = (&chosen[cube], &level.surfaces[cube]);
-        let can_divide = !is_last && surface.points >= DIVIDED_POINTS;
+        let can_divide = division < DIVISIONS && surface.points >= DIVIDED_POINTS;
         let mut smooth = None;
         if own.is_some() {
             self.around.near(&level.grid, brick, bit, 1, &mut self.near);
@@ -153,13 +153,15 @@ impl<'a> Task<'a> {
 
     /// Whether noise decides in a cube: it and three quarters of the cubes near it rest on larger neighbourhoods than the
     /// smallest, and their points lie off the surface within the samples too. The sides of a thin wall are samples of their
-    /// own; and where the smallest neighbourhood does not know its normal, what looks like noise may be the tube of a ring, which
-    /// from afar is a plane. Dividing a noisy cube would only take points away, and its parts would rest on the same surfaces.
+    /// own. Waves shorter than a cube of the base look the same, so that is divided once all the same; and where the smallest
+    /// neighbourhood does not know its normal it may be the tube of a ring, which from afar is a plane. Dividing a noisy cube
+    /// would only take points away, and its parts would rest on the same surfaces.
     fn is_noisy(&self, own: &Chosen, surface: &Surface) -> bool {
         let is_coarse = |&&(_, cube): &&(Vec3, usize)| self.vote.chosen[cube].doublings > 0;
         let coarse = self.near.iter().filter(is_coarse).count();
         let within = own.noise / (1.0 + SAMPLE * own.noise);
-        surface.error <= UNSURE
+        self.vote.division > 0
+            && surface.error <= UNSURE
             && own.doublings > 0
             && 4 * coarse >= 3 * self.near.len()
             && surface.within >= WITHIN * within
