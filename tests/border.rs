@@ -258,7 +258,7 @@ fn wrong_options_are_refused_with_what_came_and_what_was_wanted() {
         (r#"{ "cell": { "scale": "1" } }"#, r#"cell is {"scale":"1"}; wanted 'auto'"#),
         (r#"{ "cell": { "scale": 0.01 } }"#, "cell.scale is 0.01; wanted a number from 0.1 to 100"),
         (r#"{ "cell": { "size": -1 } }"#, "cell.size is -1; wanted a finite number above 0"),
-        (r#"{ "k": 1.5 }"#, "k is 1.5; wanted a whole number of at least 3"),
+        (r#"{ "k": 1.5 }"#, "k is 1.5; wanted a whole number from 3 to 4294967295"),
         (r#"{ "orient": "in" }"#, "orient is 'in'; wanted 'none', 'consistent', 'outward'"),
         (r#"{ "orient": { "up": [0, 1] } }"#, r#"orient is {"up":[0,1]}; wanted 'none'"#),
         (r#"{ "orient": { "viewpoint": [0, 1, "2"] } }"#, r#"orient is {"viewpoint":[0,1,"2"]}; wanted"#),
