@@ -1,4 +1,5 @@
 // The picture of the start screen: a sphere of points that turns from flat grey into shaded, left to right.
+import { onSphere } from './spiral';
 
 const POINTS = 4800;
 
@@ -8,12 +9,8 @@ export function drawHero(canvas: HTMLCanvasElement): void {
   const { width, height } = canvas;
   const radius = height * 0.46;
   for (let i = 0; i < POINTS; i++) {
-    // Evenly over the sphere: a Fibonacci spiral, tilted towards the eye.
-    const y0 = 1 - (2 * i + 1) / POINTS;
-    const ring = Math.sqrt(1 - y0 * y0);
-    const turn = i * Math.PI * (3 - Math.sqrt(5));
-    const z0 = ring * Math.sin(turn);
-    const x = ring * Math.cos(turn);
+    // Tilted towards the eye.
+    const [x, z0, y0] = onSphere(i, POINTS);
     const y = 0.88 * y0 - 0.475 * z0;
     const z = 0.475 * y0 + 0.88 * z0;
     if (z < 0) continue;
