@@ -136,14 +136,12 @@ function parseOrient(value: string): Task['orient'] {
 async function run(task: Task): Promise<Report> {
   const source = await about(task.input, () => openInput(task.input));
   await about(task.output, () => checkFolder(task.output));
-  // Wrong options before the work, not after it.
   let estimator = await usage(() => createEstimator({ threads: task.threads }));
-  const { orient } = task;
-  await usage(() =>
-    estimator.estimateNormals(new Float32Array(), { ...task.estimate, orient: orient === 'scanner' ? 'none' : orient }),
-  );
   const show = task.quiet || !process.stderr.isTTY ? undefined : showProgress;
   try {
+    // Wrong options before the work, not after it.
+    const orient = task.orient === 'scanner' ? 'none' : task.orient;
+    await usage(() => estimator.estimateNormals(new Float32Array(), { ...task.estimate, orient }));
     const { normals, curvature, report } = await about(task.input, async () => {
       const cloud = await estimator.readPointCloud(source, { onProgress: show?.('reading') });
       const orient = orientIn(cloud, task.orient);
