@@ -127,10 +127,7 @@ test('a bundle by Vite, with its default settings', async () => {
   const { build } = await import('vite');
   const folder = join(project, 'app');
   mkdirSync(folder);
-  writeFileSync(
-    join(folder, 'index.html'),
-    '<!doctype html><link rel="icon" href="data:," /><script type="module" src="main.js"></script>',
-  );
+  writePage(folder);
   writeFileSync(join(folder, 'main.js'), `import * as bilinormal from 'bilinormal'; window.bilinormal = bilinormal;`);
   await build({ root: folder, logLevel: 'error' });
   const isolated = await use(await open(join(folder, 'dist'), ISOLATION));
@@ -144,10 +141,7 @@ test('the point material shows what it says', async () => {
   const folder = join(project, 'material');
   mkdirSync(folder);
   linkThree();
-  writeFileSync(
-    join(folder, 'index.html'),
-    '<!doctype html><link rel="icon" href="data:," /><script type="module" src="main.js"></script>',
-  );
+  writePage(folder);
   writeFileSync(
     join(folder, 'main.js'),
     `import * as three from 'three';
@@ -210,10 +204,7 @@ test('what docs/embedding.md shows for three.js draws a file', async () => {
   mkdirSync(folder);
   linkThree();
   const [, shown] = /## three\.js\n+```js\n(.*?)```/s.exec(readFileSync(join(root, 'docs', 'embedding.md'), 'utf8'));
-  writeFileSync(
-    join(folder, 'index.html'),
-    '<!doctype html><link rel="icon" href="data:," /><script type="module" src="main.js"></script>',
-  );
+  writePage(folder);
   writeFileSync(
     join(folder, 'main.js'),
     `${shown}
@@ -247,4 +238,12 @@ test('what docs/embedding.md shows for three.js draws a file', async () => {
 function linkThree() {
   const link = join(project, 'node_modules', 'three');
   if (!existsSync(link)) symlinkSync(join(root, 'node_modules', 'three'), link, 'junction');
+}
+
+/** A page that does what main.js beside it does. */
+function writePage(folder) {
+  writeFileSync(
+    join(folder, 'index.html'),
+    '<!doctype html><link rel="icon" href="data:," /><script type="module" src="main.js"></script>',
+  );
 }
