@@ -17,7 +17,7 @@ use crate::error::Error;
 use crate::lattice::{self, Lattice};
 use crate::median::median;
 use crate::normals::{Found, Normals};
-use crate::points::{Points, reserve};
+use crate::points::{Points, grow, reserve};
 use crate::progress::{Progress, Stage};
 use crate::source::Source;
 use choose::{Chosen, choose};
@@ -157,7 +157,7 @@ impl Run<'_> {
         for end in 1..=rough.len() {
             points += if rough[end - 1] { levels[last].points(end - 1).len() } else { 0 };
             if points >= self.batch || end == rough.len() && points > 0 {
-                reserve(&mut batches, 1, "the cubes")?;
+                grow(&mut batches, 1, "the cubes")?;
                 batches.push((points, start..end));
                 (start, points) = (end, 0);
             }

@@ -112,6 +112,7 @@ impl Window {
         self.through(moments).unwrap_or(Surface { points: moments[0] as f32, ..Surface::NONE })
     }
 
+    /// The same, if the samples do not lie along a line, from their [`Window::moments`].
     #[inline(always)]
     fn through(&self, [points, total, x, y, z, xx, yy, zz, yz, xz, xy]: [f64; 11]) -> Option<Surface> {
         let share = 1.0 / total;
