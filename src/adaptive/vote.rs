@@ -20,6 +20,13 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 /// How far a surface speaks, in edges: the deviation of a normal distribution.
 const SPEAK: f32 = 1.4;
 
+/// What the square of a distance from a surface counts, against its noise: less than the half of a normal distribution,
+/// because the surface is not known exactly.
+const FALL: f32 = 0.35;
+
+/// How suddenly a surface ends where it meets another, per root of that.
+const END: f32 = 2.0;
+
 /// No surface is trusted more than to a thousandth of a radian, squared.
 const ANGLE_FLOOR: f32 = 1e-6;
 
@@ -256,7 +263,7 @@ impl Voters {
             bend: [[xx, yy, zz], [yz, xz, xy]],
             error,
             weight: 1.0 / (error + ANGLE_FLOOR + MISFIT * misfit / width),
-            fall: 0.5 / (noise + DISTANCE_FLOOR),
+            fall: FALL / (noise + DISTANCE_FLOOR),
         }
     }
 
@@ -271,7 +278,12 @@ impl Voters {
         let square = dot_lanes(slope, slope).max(Vec4::splat(f32::MIN_POSITIVE));
         let far = dot_lanes(d, d) * (0.5 / (SPEAK * SPEAK)) + self.fall * height * height / square;
         let scale = inverse_root(square);
-        Votes { weight: fade(far) * self.weight, normal: slope.map(|lanes| lanes * scale), scale }
+        Votes {
+            weight: fade(far) * self.weight,
+            normal: slope.map(|lanes| lanes * scale),
+            height: height * scale,
+            scale,
+        }
     }
 }
 
@@ -279,6 +291,8 @@ impl Voters {
 struct Votes {
     weight: Vec4,
     normal: [Vec4; 3],
+    /// Of the point over the surface.
+    height: Vec4,
     /// What makes a unit vector of the gradient.
     scale: Vec4,
 }
@@ -287,10 +301,12 @@ struct Votes {
 struct Best {
     weight: f32,
     normal: Vec3,
+    height: f32,
     /// The centre of the surface.
     centre: Vec3,
     /// Variance of the angle of the normal.
     error: f32,
+    fall: f32,
 }
 
 /// The surfaces that vote in a cube.
@@ -318,20 +334,22 @@ impl Ballot {
     fn ask(&mut self, point: Vec3) -> Best {
         self.votes.clear();
         // Lane by lane: the weight, and what else is to be told.
-        let mut most =
-            [Vec4::NEG_ONE, Vec4::ZERO, Vec4::ZERO, Vec4::ZERO, Vec4::ZERO, Vec4::ZERO, Vec4::ZERO, Vec4::ZERO];
+        let mut most = [Vec4::ZERO; 10];
+        most[0] = Vec4::NEG_ONE;
         for voters in &self.voters {
             let votes = voters.speak(point);
             let ([x, y, z], [a, b, c]) = (votes.normal, voters.centre);
             let is_more = votes.weight.cmpgt(most[0]);
-            for (most, new) in most.iter_mut().zip([votes.weight, x, y, z, a, b, c, voters.error]) {
+            for (most, new) in
+                most.iter_mut().zip([votes.weight, x, y, z, votes.height, a, b, c, voters.error, voters.fall])
+            {
                 *most = Vec4::select(is_more, new, *most);
             }
             self.votes.push(votes);
         }
         let lane = most[0].max_position();
-        let [weight, x, y, z, a, b, c, error] = most.map(|lanes| lanes[lane]);
-        Best { weight, normal: Vec3::new(x, y, z), centre: Vec3::new(a, b, c), error }
+        let [weight, x, y, z, height, a, b, c, error, fall] = most.map(|lanes| lanes[lane]);
+        Best { weight, normal: Vec3::new(x, y, z), height, centre: Vec3::new(a, b, c), error, fall }
     }
 
     /// One linear function for all points of a cube, if about its centroid all voters agree within so many radians, and the
@@ -376,18 +394,26 @@ impl Ballot {
         }
         let normal = best.normal.to_array().map(Vec4::splat);
         let centre = best.centre.to_array().map(Vec4::splat);
+        let height = Vec4::splat(best.height);
         let mut sum = [Vec4::ZERO; 3];
         for (votes, voters) in self.votes.iter().zip(&self.voters) {
             let mut side = dot_lanes(normal, votes.normal);
+            let mut weight = votes.weight / best.weight;
             let is_turned = side.abs().cmple(Vec4::splat(FRAC_1_SQRT_2));
             if is_turned.any() {
-                // Round an edge: reflected at the plane between the two, as on an arc.
+                // Round an edge: each of the two ends at the other, on the side where its centre lies, and is worth less to points
+                // whose foot on it lies beyond.
                 let across = std::array::from_fn(|axis| voters.centre[axis] - centre[axis]);
-                let reflected = dot_lanes(across, across) * side
-                    - 2.0 * dot_lanes(across, normal) * dot_lanes(across, votes.normal);
+                let (rise, fall) = (dot_lanes(across, normal), dot_lanes(across, votes.normal));
+                let unit = END * root(voters.fall.min(Vec4::splat(best.fall)));
+                let doubt = |inside: Vec4| 1.0 + fade((unit * inside).max(Vec4::splat(-8.0)));
+                let own = doubt((height * side - votes.height) * fall.signum());
+                let other = doubt((height - votes.height * side) * rise.signum());
+                weight *= Vec4::select(is_turned, own / other, Vec4::ONE);
+                // Reflected at the plane between the two, as on an arc.
+                let reflected = dot_lanes(across, across) * side - 2.0 * rise * fall;
                 side = Vec4::select(is_turned, reflected, side);
             }
-            let weight = votes.weight / best.weight;
             let weight = Vec4::select(side.cmplt(Vec4::ZERO), -weight, weight);
             (0..3).for_each(|axis| sum[axis] += weight * votes.normal[axis]);
         }
