@@ -98,6 +98,36 @@ fn closed_surfaces_face_outwards_whatever_the_method() {
     }
 }
 
+/// The cubes are wider than the tube, so that each sees the open with both sides, and the volume is next to none of that of a
+/// sphere as long.
+#[test]
+fn long_thin_tubes_face_outwards() {
+    let mut random = Random(31);
+    for closed in [true, false] {
+        for _ in 0..3 {
+            let (along, second) = (random.direction(), random.direction());
+            let across = unit(cross(along, second));
+            let up = cross(along, across);
+            let axes = |[x, y, z]: [f64; 3]| [0, 1, 2].map(|i| x * across[i] + y * up[i] + z * along[i]);
+            // In spacings of the points.
+            let (radius, length, count) = (2.0, 3000.0, 37_000);
+            let tube = Cloud::of((0..count).map(|_| {
+                let (sin, cos) = (TAU * random.unit()).sin_cos();
+                if closed && random.unit() < radius / length {
+                    let (ring, end) = (radius * random.unit().sqrt(), random.signed().signum());
+                    return (axes([ring * cos, ring * sin, 0.5 * end * length]), axes([0.0, 0.0, end]));
+                }
+                (axes([radius * cos, radius * sin, 0.5 * length * random.signed()]), axes([cos, sin, 0.0]))
+            }));
+            for how in [Orient::Consistent, Orient::Outward] {
+                let result = orient(&tube.points, how);
+                let right = share_right(&result.normals, &tube.normals);
+                assert!(right > 0.9999, "{closed}, {along:?}, {how:?}: {right}, {:?}", components(&result));
+            }
+        }
+    }
+}
+
 /// Their edges alone would say that one of them faces inwards: along the seam the surface goes on from one to the other.
 #[test]
 fn bodies_that_touch_or_cross_all_face_outwards() {

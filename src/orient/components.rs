@@ -37,7 +37,8 @@ pub struct Component {
 pub enum Side {
     /// The open air: the surface is closed, so that one side sees much more of it.
     Air,
-    /// The volume: the surface is open, or hidden, and most of its normals point away from its middle.
+    /// The volume: the surface is open, or hidden, and most of its normals point away from its middle, or if it is long and thin
+    /// from the middles of its parts.
     Volume,
     /// Nothing: the surface is open and flat. By convention `x + 2y + 4z >= 0` for its mean normal.
     Convention,
@@ -67,6 +68,10 @@ const LEAST_SIGHT: f64 = 0.01;
 /// radius.
 const LEAST_VOLUME: f64 = 0.02;
 
+/// With less in its bricks, one by one, a surface is not thin either: a tube has this if it is no thicker than two bricks and a
+/// half. Noise that is wider than a cube makes half of it of a flat surface.
+const LEAST_BULGE: f64 = 0.12;
+
 /// The convention: normals along it are positive.
 const POSITIVE: DVec3 = DVec3::new(1.0, 2.0, 4.0);
 
@@ -84,6 +89,38 @@ struct Sums {
     sight: f64,
     /// The sum of distances from the middle.
     reach: f64,
+    /// The sums over all bricks of flux against the middle there, and of distances from that.
+    bulge: f64,
+    extent: f64,
+}
+
+/// Sums over a component in one brick, from whose corner places are counted.
+#[derive(Default)]
+struct Part {
+    component: u32,
+    points: f64,
+    place: DVec3,
+    normal: DVec3,
+    flux: f64,
+    /// The sum of square places.
+    square: f64,
+}
+
+impl Part {
+    fn add(&mut self, points: f64, place: DVec3, normal: DVec3) {
+        self.points += points;
+        self.place += points * place;
+        self.normal += normal;
+        self.flux += place.dot(normal);
+        self.square += points * place.length_squared();
+    }
+
+    /// Flux against the middle, and points times their root mean square distance from it.
+    fn bulge_and_extent(&self) -> [f64; 2] {
+        let share = 1.0 / self.points;
+        let square = self.square - share * self.place.length_squared();
+        [self.flux - share * self.place.dot(self.normal), (self.points * square).max(0.0).sqrt()]
+    }
 }
 
 impl Sums {
@@ -91,7 +128,12 @@ impl Sums {
     fn decide(&self) -> (Component, bool) {
         let share = |part: f64, all: f64| if all > 0.0 { part / all } else { 0.0 };
         let air = share(self.exposure, self.sight);
-        let volume = share(self.flux - self.place.dot(self.normal) / self.points as f64, self.reach);
+        let mut volume = share(self.flux - self.place.dot(self.normal) / self.points as f64, self.reach);
+        if volume.abs() < LEAST_VOLUME {
+            // What is long and thin has none of the sphere that it spans.
+            let bulge = share(self.bulge, self.extent);
+            volume = if bulge.abs() >= LEAST_BULGE { bulge } else { 0.0 };
+        }
         let is_seen = self.sight >= LEAST_SIGHT * self.patches as f64;
         let told =
             |side, confidence: f64| Component { points: self.points, side, confidence: confidence.abs().min(1.0) };
@@ -106,18 +148,37 @@ impl Sums {
     }
 }
 
+/// Adds what a brick holds to the components that it holds it of.
+fn add_up(parts: &mut Vec<Part>, all: &mut [Sums]) {
+    for part in parts.drain(..) {
+        let [bulge, extent] = part.bulge_and_extent();
+        let sums = &mut all[part.component as usize];
+        sums.bulge += bulge;
+        sums.extent += extent;
+    }
+}
+
 /// Turns the components that face inwards, tells what decided and how sure that is, and numbers them by size.
 pub(super) fn decide(grid: &Grid, patches: &Patches, sights: &Sights, signs: &mut Signs) -> Result<Components, Error> {
     let mut all = filled(Sums::default(), signs.components, WHAT)?;
+    let corner = |brick: usize| f64::from(BRICK) * grid.bricks.places[brick].as_dvec3();
+    // The patches, their bricks, and where they are in those.
     let places = || {
         (0..grid.blocks.len()).flat_map(|block| grid.cubes_in(block)).flat_map(|(brick, cube, bit)| {
-            let centre = f64::from(BRICK) * grid.bricks.places[brick].as_dvec3() + cube_centre(bit).as_dvec3();
-            patches.of_cube(cube).map(move |i| (i, centre + patches.all[i].centre.as_dvec3()))
+            let centre = cube_centre(bit);
+            patches.of_cube(cube).map(move |i| (i, brick, (centre + patches.all[i].centre).as_dvec3()))
         })
     };
-    for (i, place) in places() {
-        let (patch, sums) = (&patches.all[i], &mut all[signs.component[i] as usize]);
-        let points = f64::from(patch.points);
+    let mut parts: Vec<Part> = Vec::new();
+    let mut in_brick = 0;
+    for (i, brick, local) in places() {
+        if brick != in_brick {
+            in_brick = brick;
+            add_up(&mut parts, &mut all);
+        }
+        let component = signs.component[i];
+        let (patch, sums) = (&patches.all[i], &mut all[component as usize]);
+        let (points, place) = (f64::from(patch.points), corner(brick) + local);
         let normal = points * signed(signs.flipped[i], patch.normal).as_dvec3();
         sums.number = signs.component[i];
         sums.patches += 1;
@@ -127,9 +188,19 @@ pub(super) fn decide(grid: &Grid, patches: &Patches, sights: &Sights, signs: &mu
         sums.flux += place.dot(normal);
         sums.exposure += f64::from(signed(signs.flipped[i], sights.exposure[i]));
         sums.sight += f64::from(sights.all[i]);
+        let part = match parts.iter().position(|part| part.component == component) {
+            Some(known) => known,
+            None => {
+                reserve(&mut parts, 1, WHAT)?;
+                parts.push(Part { component, ..Part::default() });
+                parts.len() - 1
+            }
+        };
+        parts[part].add(points, local, normal);
     }
-    for (i, place) in places() {
-        let sums = &mut all[signs.component[i] as usize];
+    add_up(&mut parts, &mut all);
+    for (i, brick, local) in places() {
+        let (sums, place) = (&mut all[signs.component[i] as usize], corner(brick) + local);
         sums.reach += f64::from(patches.all[i].points) * place.distance(sums.place / sums.points as f64);
     }
     all.sort_unstable_by_key(|sums| (Reverse(sums.points), sums.number));
