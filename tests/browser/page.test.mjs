@@ -349,14 +349,15 @@ test('normals are saved with the signs of the orientation that was chosen', asyn
     assert.match(facts, /1 surface\s+100% in the largest\s+outwards with confidence (1\.00|0\.[89]\d)/);
   }
   // Across the axis the sign is free, and a normal of the sphere is off by a degree at the most.
-  const rising = (axis) => (_, normal) => normal[axis] + 0.001;
-  for (const [up, axis] of [
-    ['Y', 1],
-    ['Z', 2],
+  const rising = (axis, sign) => (_, normal) => sign * normal[axis] + 0.001;
+  for (const [up, axis, sign] of [
+    ['Y', 1, 1],
+    ['−Y', 1, -1],
+    ['Z', 2, 1],
   ]) {
     await page.getByRole('radio', { name: up, exact: true }).check();
     const { facts, saved } = await oriented('Up');
-    assert.equal(shareOf(saved, rising(axis)), 1, up);
+    assert.equal(shareOf(saved, rising(axis, sign)), 1, up);
     assert.match(facts, new RegExp(`upwards\\s+along ${up}`));
     assert.doesNotMatch(facts, /surface/);
   }
@@ -780,6 +781,18 @@ test('while WebGL is stopped the page says so, and then it draws again', async (
   await stopped.evaluate((extension) => extension.restoreContext());
   await told.waitFor({ state: 'hidden' });
   assert.equal(await colorsShown(page), drawn);
+});
+
+test('what a depth camera saw stands upright', async () => {
+  page = await browser.openPage(browser.isolated);
+  for (const [name, ahead, up] of [
+    ['thing.ply', 0, 'Y'],
+    ['frame.ply', 3, '−Y'],
+  ]) {
+    await drop(page, name, spherePly(5_000, { centres: [[0.2, -0.1, ahead]] }));
+    await result(page, name);
+    assert.ok(await page.getByRole('radio', { name: up, exact: true }).isChecked(), name);
+  }
 });
 
 const AERIAL = join(SCANS, 'las_ahn3_cropped.ply.gz');

@@ -1,5 +1,7 @@
 // How far a cloud reaches and which way is up, without being fooled by stray or non-finite points.
 
+import type { Up } from './viewer';
+
 export interface Bounds {
   /** Middle of the bulk of the points. */
   centre: [number, number, number];
@@ -59,10 +61,13 @@ export function boundsOf(positions: Float32Array): Bounds {
 }
 
 /**
- * Which axis points up. Surveys and rooms are z-up and flat along z, often with an origin far away; single things
- * (meshes, range scans, statues) are mostly y-up.
+ * Which axis points up. Surveys and rooms are z-up and flat along z, often with an origin far away; what a depth camera saw
+ * lies before it, along z, and its y points down; single things (meshes, range scans, statues) are mostly y-up.
  */
-export function guessUp({ extent: [x, y, z] }: Bounds, origin: readonly number[]): 'y' | 'z' {
+export function guessUp({ centre, extent: [x, y, z] }: Bounds, origin: readonly number[]): Up {
   const surveyed = origin.some((value) => value !== 0);
-  return surveyed || z < 0.6 * Math.min(x, y) ? 'z' : 'y';
+  if (surveyed || z < 0.6 * Math.min(x, y)) return 'z';
+  const [right, down, ahead] = centre;
+  const isAhead = ahead > 0.75 * z && ahead > Math.max(x, y) / 2;
+  return isAhead && Math.abs(right) < x / 2 && Math.abs(down) < y / 2 ? '-y' : 'y';
 }

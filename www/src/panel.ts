@@ -178,7 +178,10 @@ function signsOf({ components, points }: Report, { scan, used, flipped, turnedSu
     ];
   }
   if (typeof used?.orient !== 'object') return [];
-  if ('up' in used.orient) return [fact(flipped ? 'downwards' : 'upwards', `along ${used.orient.up[2] ? 'Z' : 'Y'}`)];
+  if ('up' in used.orient) {
+    const [, y, z] = used.orient.up;
+    return [fact(flipped ? 'downwards' : 'upwards', `along ${z ? 'Z' : y < 0 ? '−Y' : 'Y'}`)];
+  }
   const way = flipped ? 'away from' : 'towards';
   if (used.orient.viewpoint === scan?.scanner) return [fact(`${way} the scanner`, 'as the file says')];
   return [fact(`${way} the camera`, 'as it was')];

@@ -17,7 +17,8 @@ import type { Bounds } from './bounds';
 import { pickPoint } from './pick';
 
 export type Shading = MaterialShading | 'curvature';
-export type Up = 'y' | 'z';
+/** An axis of the file, or the opposite of one. */
+export type Up = 'y' | 'z' | '-y';
 
 export interface Cloud {
   /** x0 y0 z0 x1 ...; points that are not finite are not drawn. */
@@ -341,7 +342,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       request();
     },
     setUp(up) {
-      turned.rotation.x = up === 'z' ? -Math.PI / 2 : 0;
+      turned.rotation.x = { y: 0, z: -Math.PI / 2, '-y': Math.PI }[up];
       request();
     },
     fit,
