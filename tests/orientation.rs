@@ -128,6 +128,35 @@ fn long_thin_tubes_face_outwards() {
     }
 }
 
+/// Neither is thin all round, so that the convention holds: all of a height field looks up, wherever the bricks lie on it.
+#[test]
+fn ditches_and_pits_look_up() {
+    let mut random = Random(32);
+    let ditch = Cloud::of((0..60_000).map(|_| {
+        let angle = std::f64::consts::PI * random.unit();
+        let (sin, cos) = angle.sin_cos();
+        ([8.0 * cos, 2400.0 * random.unit(), -8.0 * sin], [-cos, 0.0, sin])
+    }));
+    let wave = TAU / 24.0;
+    let pits = |shift: f64| {
+        let mut random = Random(33);
+        Cloud::of((0..50_000).map(move |_| {
+            let (x, y) = (shift + 220.0 * random.unit(), 220.0 * random.unit());
+            let slope =
+                [5.0 * wave * (wave * x).cos() * (wave * y).sin(), 5.0 * wave * (wave * x).sin() * (wave * y).cos()];
+            let length = (1.0 + slope[0] * slope[0] + slope[1] * slope[1]).sqrt();
+            let height = 5.0 * (wave * x).sin() * (wave * y).sin();
+            ([x, y, height], [-slope[0] / length, -slope[1] / length, 1.0 / length])
+        }))
+    };
+    let pits = [0.0, 5.0, 10.0, 20.0].map(pits);
+    for (number, cloud) in pits.iter().chain([&ditch]).enumerate() {
+        let result = orient(&cloud.points, Orient::Consistent);
+        let right = share_right(&result.normals, &cloud.normals);
+        assert!(right > 0.999, "{number}: {right}, {:?}", components(&result)[0]);
+    }
+}
+
 /// Their edges alone would say that one of them faces inwards: along the seam the surface goes on from one to the other.
 #[test]
 fn bodies_that_touch_or_cross_all_face_outwards() {

@@ -107,10 +107,10 @@ export interface Report {
   /**
    * The surfaces that were given one sign each: how many there are, and at most the thousand largest, the largest first.
    * `side` tells by what: `'air'`, because the surface is closed, and one side sees much more of the open air; `'volume'`, away
-   * from the middle, or the middles of its pieces, of what is open, hidden or thin; `'convention'`, because it is open and flat, so that nothing tells: the mean
-   * normal has `x + 2y + 4z >= 0`. `confidence`, from 0, a guess, to 1, which is sure: of all that is seen of the open, how much
-   * more is seen from one side; for what sees nothing of it how much volume there is, of that of a sphere. Only with
-   * `orient: 'consistent'` and `'outward'`.
+   * from the middle of what is open or hidden, or, of what is long and thin, from the middles of its pieces; `'convention'`,
+   * because it is open and flat, so that nothing tells: the mean normal has `x + 2y + 4z >= 0`. `confidence`, from 0, a guess,
+   * to 1, which is sure: of all that is seen of the open, how much more is seen from one side; for what sees nothing of it how
+   * much volume there is, of that of a sphere, or of its pieces. Only with `orient: 'consistent'` and `'outward'`.
    */
   components?: {
     count: number;

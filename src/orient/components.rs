@@ -72,6 +72,9 @@ const LEAST_VOLUME: f64 = 0.02;
 /// half. Noise that is wider than a cube makes half of it of a flat surface.
 const LEAST_BULGE: f64 = 0.12;
 
+/// The mean of normals that look all round is shorter.
+const ALL_ROUND: f64 = 0.5;
+
 /// The convention: normals along it are positive.
 const POSITIVE: DVec3 = DVec3::new(1.0, 2.0, 4.0);
 
@@ -130,9 +133,11 @@ impl Sums {
         let air = share(self.exposure, self.sight);
         let mut volume = share(self.flux - self.place.dot(self.normal) / self.points as f64, self.reach);
         if volume.abs() < LEAST_VOLUME {
-            // What is long and thin has none of the sphere that it spans.
+            // What is long and thin has none of the sphere that it spans. A ditch is so too, but says by its mean normal where
+            // most of it looks.
             let bulge = share(self.bulge, self.extent);
-            volume = if bulge.abs() >= LEAST_BULGE { bulge } else { 0.0 };
+            let is_all_round = self.normal.length() < ALL_ROUND * self.points as f64;
+            volume = if is_all_round && bulge.abs() >= LEAST_BULGE { bulge } else { 0.0 };
         }
         let is_seen = self.sight >= LEAST_SIGHT * self.patches as f64;
         let told =
