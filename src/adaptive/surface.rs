@@ -228,8 +228,9 @@ impl Window {
         let (mut coefficients, mut variances) = solve(&mut matrix, right)?;
         let explained: f64 = coefficients.iter().zip(right).map(|(c, r)| c * r).sum();
         let residual = (hh - explained).max(0.0);
-        // Bends count as much as noise leaves of them: noise alone would bend a plane, most of all where it is continued.
-        // Along the principal axes the other coefficients follow from them.
+        // Noise alone would bend a plane, and most of all where that is continued: each bend is shrunk, the more the larger its
+        // variance is. The other coefficients follow, as if along the principal axes `uu` and `vv` were 1 and `uv` 0: the
+        // samples have some of that inside.
         let variance = residual / (self.len() as f64 - 6.0);
         let [aa, ab, bb] = [3, 4, 5].map(|i| {
             let (c, square): (f64, f64) = (coefficients[i], coefficients[i] * coefficients[i]);
@@ -426,7 +427,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_hardly_bends_a_plane() {
+    fn noise_bends_a_plane_less_than_least_squares_would() {
         let mut uniform = uniform();
         let rounds = 200;
         let squares = (0..rounds).map(|_| {

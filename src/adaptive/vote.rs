@@ -24,8 +24,12 @@ const SPEAK: f32 = 1.4;
 /// because the surface is not known exactly.
 const FALL: f32 = 0.35;
 
-/// How suddenly a surface ends where it meets another, per root of that.
+/// How suddenly a surface ends where it meets another: what the distance to there counts, against the noise, for each root of
+/// `FALL`.
 const END: f32 = 2.0;
+
+/// Further than so beyond its end a surface counts no less: `fade` bears no more.
+const BEYOND: f32 = -8.0;
 
 /// No surface is trusted more than to a thousandth of a radian, squared.
 const ANGLE_FLOOR: f32 = 1e-6;
@@ -196,7 +200,7 @@ fn quartile(values: impl Iterator<Item = f32> + Clone) -> f32 {
     least[4 + rank]
 }
 
-/// `exp(-x)`, nearly: the same bits everywhere. Zero from some 10,000.
+/// `exp(-x)`, nearly, and below zero more than that: the same bits everywhere. Zero from some 10,000; not for -16 and less.
 #[inline(always)]
 fn fade(x: Vec4) -> Vec4 {
     let mut power = Vec4::ONE / (1.0 + x * (1.0 / 16.0));
@@ -401,17 +405,17 @@ impl Ballot {
             let mut weight = votes.weight / best.weight;
             let is_turned = side.abs().cmple(Vec4::splat(FRAC_1_SQRT_2));
             if is_turned.any() {
-                // Round an edge: each of the two ends at the other, on the side where its centre lies, and is worth less to points
-                // whose foot on it lies beyond.
+                // Round an edge. Each of the two ends at the other, on the side where its centre lies: the further the point's
+                // foot on it lies inside, the more it counts, `1 / (1 + exp(-inside))`.
                 let across = std::array::from_fn(|axis| voters.centre[axis] - centre[axis]);
-                let (rise, fall) = (dot_lanes(across, normal), dot_lanes(across, votes.normal));
+                let (rise, drop) = (dot_lanes(across, normal), dot_lanes(across, votes.normal));
                 let unit = END * root(voters.fall.min(Vec4::splat(best.fall)));
-                let doubt = |inside: Vec4| 1.0 + fade((unit * inside).max(Vec4::splat(-8.0)));
-                let own = doubt((height * side - votes.height) * fall.signum());
-                let other = doubt((height - votes.height * side) * rise.signum());
-                weight *= Vec4::select(is_turned, own / other, Vec4::ONE);
+                let doubt = |inside: Vec4| 1.0 + fade((unit * inside).max(Vec4::splat(BEYOND)));
+                let of_best = doubt((height * side - votes.height) * drop.signum());
+                let of_other = doubt((height - votes.height * side) * rise.signum());
+                weight *= Vec4::select(is_turned, of_best / of_other, Vec4::ONE);
                 // Reflected at the plane between the two, as on an arc.
-                let reflected = dot_lanes(across, across) * side - 2.0 * rise * fall;
+                let reflected = dot_lanes(across, across) * side - 2.0 * rise * drop;
                 side = Vec4::select(is_turned, reflected, side);
             }
             let weight = Vec4::select(side.cmplt(Vec4::ZERO), -weight, weight);
@@ -424,6 +428,7 @@ impl Ballot {
 
 #[cfg(test)]
 mod tests {
+    use super::super::surface::Quadric;
     use super::*;
 
     #[test]
@@ -437,12 +442,35 @@ mod tests {
         }
     }
 
+    /// Round the edge of a block: a point past the end of the top is on the side, though the top's plane is nearer.
+    #[test]
+    fn faces_end_where_they_meet() {
+        let face = |centre: Vec3, normal: Vec3| {
+            let quadric = Quadric { centre, height: 0.0, slope: normal, ..Quadric::NONE };
+            Chosen { quadric, noise: 4e-4, error: 1e-3, ..Chosen::NONE }
+        };
+        let faces = [face(-0.5 * Vec3::X, Vec3::Z), face(-0.5 * Vec3::Z, Vec3::X)];
+        for order in [[0, 1], [1, 0]] {
+            let mut ballot = Ballot::default();
+            ballot.invite(&order.map(|cube| (Vec3::ZERO, cube)), &faces, f32::INFINITY);
+            let beyond_the_top = ballot.vote(Vec3::new(0.03, 0.0, -0.02)).normalize();
+            assert!(beyond_the_top.x > 0.9, "{beyond_the_top}");
+            let beyond_the_side = ballot.vote(Vec3::new(-0.02, 0.0, 0.03)).normalize();
+            assert!(beyond_the_side.z > 0.9, "{beyond_the_side}");
+            let between = ballot.vote(Vec3::new(-0.02, 0.0, -0.02)).normalize();
+            assert!((between.x - between.z).abs() < 1e-3, "{between}");
+        }
+    }
+
     #[test]
     fn fading_is_that_of_the_exponential_near_zero_and_never_less() {
         for x in [0.0f32, 0.01, 0.1, 0.5, 1.0] {
             assert!((fade(Vec4::splat(x)).x / (-x).exp() - 1.0).abs() < 0.04, "{x}");
         }
         let fade = |x: f32| fade(Vec4::splat(x)).x;
+        for x in [BEYOND, -4.0, -1.0] {
+            assert!(fade(x) >= (-x).exp() && fade(x) < 100_000.0, "{x}");
+        }
         for x in [2.0f32, 5.0, 20.0, 1e3, 1e30] {
             assert!(fade(x) >= (-x).exp() && fade(x) < fade(0.99 * x).max(1e-37), "{x}");
         }

@@ -67,6 +67,7 @@ export function boundsOf(positions: Float32Array): Bounds {
 export function guessUp({ centre, extent: [x, y, z] }: Bounds, origin: readonly number[]): Up {
   const surveyed = origin.some((value) => value !== 0);
   if (surveyed || z < 0.6 * Math.min(x, y)) return 'z';
+  // Nothing behind or close to the camera, all within a right angle, and its axis passes through it.
   const [right, down, ahead] = centre;
   const isAhead = ahead > 0.75 * z && ahead > Math.max(x, y) / 2;
   return isAhead && Math.abs(right) < x / 2 && Math.abs(down) < y / 2 ? '-y' : 'y';
