@@ -28,7 +28,8 @@ pub struct Component {
     /// What told its outside.
     pub side: Side,
     /// How much more speaks for that side than for the other: 0 is a guess, 1 is sure. By the air of all that is seen of the
-    /// open how much more is seen from one side; for what sees nothing of it how much volume there is, of that of a sphere.
+    /// open how much more is seen from one side; for what sees nothing of it how much volume there is, of that of a sphere, or
+    /// of its pieces.
     pub confidence: f64,
 }
 
@@ -110,6 +111,7 @@ struct Part {
 }
 
 impl Part {
+    /// Adds a patch; its normal is as long as it has points.
     fn add(&mut self, points: f64, place: DVec3, normal: DVec3) {
         self.points += points;
         self.place += points * place;
@@ -154,10 +156,13 @@ impl Sums {
 }
 
 /// Adds what a brick holds to the components that it holds it of.
-fn add_up(parts: &mut Vec<Part>, all: &mut [Sums]) {
+fn add_up(parts: &mut Vec<Part>, corner: DVec3, all: &mut [Sums]) {
     for part in parts.drain(..) {
         let [bulge, extent] = part.bulge_and_extent();
         let sums = &mut all[part.component as usize];
+        sums.place += part.place + part.points * corner;
+        sums.normal += part.normal;
+        sums.flux += part.flux + corner.dot(part.normal);
         sums.bulge += bulge;
         sums.extent += extent;
     }
@@ -178,19 +183,14 @@ pub(super) fn decide(grid: &Grid, patches: &Patches, sights: &Sights, signs: &mu
     let mut in_brick = 0;
     for (i, brick, local) in places() {
         if brick != in_brick {
+            add_up(&mut parts, corner(in_brick), &mut all);
             in_brick = brick;
-            add_up(&mut parts, &mut all);
         }
         let component = signs.component[i];
         let (patch, sums) = (&patches.all[i], &mut all[component as usize]);
-        let (points, place) = (f64::from(patch.points), corner(brick) + local);
-        let normal = points * signed(signs.flipped[i], patch.normal).as_dvec3();
-        sums.number = signs.component[i];
+        sums.number = component;
         sums.patches += 1;
         sums.points += u64::from(patch.points);
-        sums.place += points * place;
-        sums.normal += normal;
-        sums.flux += place.dot(normal);
         sums.exposure += f64::from(signed(signs.flipped[i], sights.exposure[i]));
         sums.sight += f64::from(sights.all[i]);
         let part = match parts.iter().position(|part| part.component == component) {
@@ -201,9 +201,12 @@ pub(super) fn decide(grid: &Grid, patches: &Patches, sights: &Sights, signs: &mu
                 parts.len() - 1
             }
         };
-        parts[part].add(points, local, normal);
+        let points = f64::from(patch.points);
+        parts[part].add(points, local, points * signed(signs.flipped[i], patch.normal).as_dvec3());
     }
-    add_up(&mut parts, &mut all);
+    if !parts.is_empty() {
+        add_up(&mut parts, corner(in_brick), &mut all);
+    }
     for (i, brick, local) in places() {
         let (sums, place) = (&mut all[signs.component[i] as usize], corner(brick) + local);
         sums.reach += f64::from(patches.all[i].points) * place.distance(sums.place / sums.points as f64);
