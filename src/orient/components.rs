@@ -7,7 +7,7 @@ use super::signs::{CLOSED, Signs};
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::lattice::{BRICK, cube_centre};
-use crate::points::{filled, reserve};
+use crate::points::{filled, grow, reserve};
 use glam::DVec3;
 use std::cmp::Reverse;
 
@@ -196,7 +196,7 @@ pub(super) fn decide(grid: &Grid, patches: &Patches, sights: &Sights, signs: &mu
         let part = match parts.iter().position(|part| part.component == component) {
             Some(known) => known,
             None => {
-                reserve(&mut parts, 1, WHAT)?;
+                grow(&mut parts, 1, WHAT)?;
                 parts.push(Part { component, ..Part::default() });
                 parts.len() - 1
             }
