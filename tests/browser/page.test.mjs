@@ -788,6 +788,7 @@ test('what a depth camera saw stands upright', async () => {
   for (const [name, ahead, up] of [
     ['thing.ply', 0, 'Y'],
     ['frame.ply', 3, '−Y'],
+    ['behind.ply', -3, 'Y'],
   ]) {
     await drop(page, name, spherePly(5_000, { centres: [[0.2, -0.1, ahead]] }));
     await result(page, name);
