@@ -56,7 +56,7 @@ pub(super) fn sort(
 /// some bricks, or `scale` times as large, as many as fit into a brick.
 fn noise(grid: &Grid, normals: &[Vec3], scale: f32) -> f32 {
     /// Bricks to look at: their cubes are enough for a median.
-    const BRICKS: usize = 256;
+    const BRICKS: usize = 64;
     let along = (BRICK as f32 / scale) as usize;
     let (mut cubes, mut gaps, mut deviations) = (vec![Vec::new(); along.pow(3)], Vec::new(), Vec::new());
     for brick in spread(grid.bricks.len(), BRICKS) {
