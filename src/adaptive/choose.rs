@@ -76,7 +76,7 @@ pub(super) fn choose(levels: &[Level], stage: &Stage) -> Result<Vec<Chosen>, Err
     smallest.grid.each_cube(stage, &|brick, cube, bit| {
         let place = smallest.place(brick, bit);
         // SAFETY: once for each cube.
-        unsafe { chosen.write(cube, of_cube(levels, place, smallest.centroid(cube))) };
+        unsafe { chosen.write(cube, of_cube(levels, place, smallest.centroid(cube, bit))) };
     })?;
     // SAFETY: these were all cubes.
     Ok(unsafe { chosen.complete() })

@@ -73,23 +73,24 @@ impl Level {
         Ok(())
     }
 
-    /// Cubes of twice the edge, in which each cube of this level is a sample.
+    /// Cubes of twice the edge, in which each cube of this level is a sample. Gives up the samples of this level.
     #[optimize(size)]
     #[inline(never)]
-    pub fn coarser(&self, stage: &Stage) -> Result<Self, Error> {
-        let grid = &self.grid;
-        let (positions, wholes) = (Filling::new(grid.cubes(), WHAT)?, Filling::new(grid.cubes(), WHAT)?);
-        grid.each_cube(&stage.part(0.0..0.3), &|_, cube, bit| {
-            let whole = self.whole(cube);
+    pub fn coarser(&mut self, stage: &Stage) -> Result<Self, Error> {
+        let cubes = self.grid.cubes();
+        let (positions, wholes) = (Filling::new(cubes, WHAT)?, Filling::new(cubes, WHAT)?);
+        self.grid.each_cube(&stage.part(0.0..0.3), &|_, cube, bit| {
+            let whole = Sample::of(range(&self.sample_end, cube).map(|sample| self.samples.get(sample)));
             // SAFETY: once for each cube.
             unsafe {
                 positions.write(cube, cube_centre(bit) + whole.place);
                 wholes.write(cube, whole);
             }
         })?;
+        self.release_samples();
         // SAFETY: these were all cubes.
         let (positions, wholes) = unsafe { (positions.complete(), wholes.complete()) };
-        let other = OtherGrid { bricks: &grid.bricks.places, ends: &grid.first_cube[1..], edge: 0.5 };
+        let other = OtherGrid { bricks: &self.grid.bricks.places, ends: &self.grid.first_cube[1..], edge: 0.5 };
         let lattice = self.lattice.coarser();
         let source = Source { lattice, positions: &positions, numbers: None, other: Some(other) };
         let mut level = Self::new(&source, &stage.part(0.3..0.9))?;
@@ -158,6 +159,7 @@ impl Level {
         drop((positions, numbers, ends));
         level.sample(None, &stage.part(0.45..0.5))?;
         level.fit(&stage.part(0.5..0.9))?;
+        level.release_samples();
         let wanted = Filling::new(level.grid.cubes(), "the cubes")?;
         level.grid.each_cube(&stage.part(0.9..1.0), &|brick, cube, bit| {
             // In whole numbers: a point must get its normal once.
@@ -173,11 +175,10 @@ impl Level {
     /// Gives up what only the smallest cubes need.
     pub fn release_points(&mut self) {
         self.grid.placed = Vec::new();
-        self.release_samples();
     }
 
     /// Gives up what surfaces were fitted to.
-    pub fn release_samples(&mut self) {
+    fn release_samples(&mut self) {
         (self.samples, self.sample_end) = (Samples::default(), Vec::new());
     }
 
@@ -191,15 +192,10 @@ impl Level {
         &self.grid.placed[range(&self.grid.cube_end, cube)]
     }
 
-    /// The sample that stands for a cube.
-    #[inline(always)]
-    fn whole(&self, cube: usize) -> Sample {
-        Sample::of(range(&self.sample_end, cube).map(|sample| self.samples.get(sample)))
-    }
-
-    /// The centroid of a cube's points, against its centre.
-    pub fn centroid(&self, cube: usize) -> Vec3 {
-        self.whole(cube).place
+    /// The centroid of the points of a cube, against its centre.
+    pub fn centroid(&self, cube: usize, bit: u32) -> Vec3 {
+        let centre = cube_centre(bit);
+        Sample::of(self.points(cube).iter().map(|p| Sample::point(p.local - centre))).place
     }
 
     /// Where a cube lies, in cubes from the first there can be.

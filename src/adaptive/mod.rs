@@ -92,7 +92,6 @@ pub(crate) fn normals(
     let stage = progress.stage("vote", 0.5..0.6);
     let chosen = choose(&levels, &stage.part(0.0..0.4))?;
     let base = levels.len() - 1;
-    levels[base].release_samples();
     let mut run = Run { batch: BATCH.max(count / 8), normals: &normals, cubes: 0, surfaces: 0, chosen_by: [0; SIZES] };
     let rough = run.settle(&levels, &chosen, 0, &stage.part(0.4..1.0))?;
     let mut noises = Vec::new();
@@ -178,7 +177,6 @@ impl Run<'_> {
             }
             levels.push(finer);
             let chosen = choose(levels, &stage.part(0.3..0.4))?;
-            levels[last + 1].release_samples();
             let rough = self.settle(levels, &chosen, division + 1, &stage.part(0.4..0.5))?;
             drop(chosen);
             self.divide(levels, division + 1, &rough, &stage.part(0.5..1.0))?;
