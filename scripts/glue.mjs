@@ -7,8 +7,8 @@ import { readFileSync, readdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { Failure, root } from './run.mjs';
 
-/** Bytes of the stack of a thread: as many as that of the worker has. By default it is twice as much. */
-const STACK = 1 << 20;
+/** Bytes of the stack of a thread: as many as the linker gives to the worker (scripts/*.toml). By default it is 2 MiB. */
+const STACK = 1 << 18;
 
 /** Shortens glue, and the names that it shares with the wasm modules in a folder of dist/. */
 export function shortenGlue(glue, folder) {

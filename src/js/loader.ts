@@ -24,7 +24,7 @@ export interface Loaded {
 /** More threads than this gain little: the work waits for memory. */
 const mostThreads = 16;
 /** What the modules begin with, in pages of 64 KiB: --initial-memory in scripts/*.toml, and some that wasm-bindgen adds. */
-const initialPages = 40;
+const initialPages = 9;
 /** An engine that refuses this much shared memory gets no threads. */
 const leastMiB = 512;
 
