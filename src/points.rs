@@ -216,6 +216,8 @@ pub(crate) struct Bulk {
     pub median: DVec3,
     /// The longest side of the box that holds the middle 90 % of each axis.
     pub extent: f64,
+    /// The same of the middle half.
+    pub core: f64,
     /// The finite points looked at.
     pub sample: Vec<DVec3>,
 }
@@ -226,11 +228,12 @@ impl Bulk {
         Self::of(points.len(), &|i| points.positions[i].as_dvec3())
     }
 
-    /// Looks at `at(0) .. at(count - 1)`, at most a few thousand of them; non-finite points are passed over.
+    /// Looks at `at(0) .. at(count - 1)`, at most a few thousand of them. What is not finite is passed over, and
+    /// `0 0 0`, which scanners write for what gave no echo.
     #[optimize(size)]
     pub fn of(count: usize, at: &dyn Fn(usize) -> DVec3) -> Self {
-        let sample: Vec<DVec3> = spread(count, SAMPLE).map(at).filter(|p| p.is_finite()).collect();
-        let mut bulk = Self { median: DVec3::ZERO, extent: 0.0, sample };
+        let sample: Vec<DVec3> = spread(count, SAMPLE).map(at).filter(|p| p.is_finite() && *p != DVec3::ZERO).collect();
+        let mut bulk = Self { median: DVec3::ZERO, extent: 0.0, core: 0.0, sample };
         if bulk.sample.is_empty() {
             return bulk;
         }
@@ -240,6 +243,7 @@ impl Bulk {
             let quantile = |q: f64| from_ordinal(values[((values.len() - 1) as f64 * q + 0.5) as usize]);
             bulk.median[axis] = quantile(0.5);
             bulk.extent = bulk.extent.max(quantile(0.95) - quantile(0.05));
+            bulk.core = bulk.core.max(quantile(0.75) - quantile(0.25));
         }
         bulk
     }
@@ -248,7 +252,27 @@ impl Bulk {
 /// The origin to subtract from double coordinates before they are rounded to single precision: zero where single
 /// precision tells points apart as well as they need, else whole numbers near the bulk of the points.
 pub(crate) fn choose_origin(count: usize, at: &dyn Fn(usize) -> DVec3) -> DVec3 {
-    let Bulk { median, extent, .. } = Bulk::of(count, at);
-    // Single precision has 24 bits: beyond four extents fewer than 22 are left for the extent itself.
-    if median.abs().max_element() <= 4.0 * extent { DVec3::ZERO } else { median.round() }
+    let Bulk { median, core, .. } = Bulk::of(count, at);
+    // Single precision has 24 bits: beyond four extents, of which the core is about half, fewer than 22 are left for the extent
+    // itself. The core, because up to a quarter of the points may be marks for what is missing.
+    if median.abs().max_element() <= 8.0 * core { DVec3::ZERO } else { median.round() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A survey of which many points are marks for what gave no echo.
+    #[test]
+    fn the_origin_is_that_of_what_was_measured() {
+        let place = DVec3::new(431_000.0, 5_412_000.0, 120.0);
+        for (mark, of_ten) in [(DVec3::ZERO, 8), (DVec3::ZERO, 3), (DVec3::splat(-9999.0), 2)] {
+            let at = |i: usize| if i % 10 < of_ten { mark } else { place + (i as f64 * 0.37) % 20.0 };
+            let origin = choose_origin(20_000, &at);
+            assert!(origin.distance(place) < 40.0, "{origin} with {of_ten} of ten at {mark}");
+        }
+        // What lies near zero keeps its coordinates.
+        assert_eq!(choose_origin(1000, &|i| DVec3::splat(i as f64 * 0.01)), DVec3::ZERO);
+        assert_eq!(choose_origin(1000, &|_| DVec3::ZERO), DVec3::ZERO);
+    }
 }

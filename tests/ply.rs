@@ -348,10 +348,10 @@ fn near_doubles_and_all_floats_keep_a_zero_origin() {
 
 #[test]
 fn coordinates_that_are_not_finite_are_kept_and_finite_ones_stay_finite() {
-    let rows = [[f64::NAN, f64::INFINITY, f64::NEG_INFINITY], [1e300, -1e300, 1.0], [0.0, 0.0, 0.0]];
+    let rows = [[f64::NAN, f64::INFINITY, f64::NEG_INFINITY], [1e300, -1e300, 1.0], [0.5, 0.0, 0.0], [1.0; 3]];
     let text = body(TEXT, &rows.map(|p| p.map(V::F64).to_vec()));
     let mut files = in_all_formats(&["double x", "double y", "double z"], &rows.map(|p| p.map(V::F64).to_vec()));
-    files[0] = file(TEXT, 3, &["double x", "double y", "double z"], &text);
+    files[0] = file(TEXT, 4, &["double x", "double y", "double z"], &text);
     for file in files {
         let cloud = read(file).unwrap();
         assert!(cloud.positions[0].is_nan());
