@@ -38,7 +38,7 @@ pub(crate) fn parse(text: &[u8], single: bool) -> Option<(f64, usize)> {
             exponent += if negative { -power } else { power };
         }
     }
-    let short = if count > 19 { None } else { short_way(mantissa, exponent) };
+    let short = if count > 19 { cut_way(&text[start..end], exponent) } else { short_way(mantissa, exponent) };
     // Rounding twice is rounding once, unless the first time leads just between two singles.
     let sure = short.filter(|value| !single || *value == 0.0 || !is_between_singles(*value));
     let value = sure.unwrap_or_else(|| long_way(&text[start..end], exponent, Precision::of(single)));
@@ -100,6 +100,23 @@ fn scaled_way(mantissa: u64, exponent: i64) -> Option<f64> {
     let doubt = value * 2e-30;
     let (least, most) = (value + (lost - doubt), value + (lost + doubt));
     (least == most).then_some(least)
+}
+
+/// The same for any number of digits, by the first nineteen or so: sure where one more in the last of these makes no difference.
+/// `exponent` belongs to the last digit.
+#[optimize(size)]
+#[inline(never)]
+fn cut_way(digits: &[u8], mut exponent: i64) -> Option<f64> {
+    let mut mantissa = 0;
+    for digit in digits.iter().map(|byte| byte.wrapping_sub(b'0')).filter(|digit| *digit < 10) {
+        if mantissa >> 60 == 0 {
+            mantissa = 10 * mantissa + u64::from(digit);
+        } else {
+            exponent += 1;
+        }
+    }
+    let least = scaled_way(mantissa, exponent);
+    least.filter(|_| least == scaled_way(mantissa + 1, exponent))
 }
 
 /// Whether a double lies halfway between two singles, or where singles are further apart.
@@ -294,6 +311,11 @@ mod tests {
             let low = (1_u64 << 53) + (random.next() >> 14);
             check(&format!("{}", 2 * low + 1));
             check(&format!("{}.5", low >> 1));
+            // More digits than are looked at before the long way.
+            check(&format!("0.000{}", 2 * low + 1));
+            check(&format!("{}.5000000000000000000000", low >> 1));
+            check(&format!("{}.49999999999999999999999", low >> 1));
+            check(&format!("{:.25}", f64::from_bits(random.next() >> 2)));
         }
     }
 
