@@ -334,7 +334,7 @@ fn foreign(file: &[u8]) -> Error {
         (b"glTF", ("a binary glTF file", "")),
         (b"OFF", ("an OFF file", "")),
         (b"version https://git-lfs", ("a Git LFS pointer", "; fetch the file with git lfs pull")),
-        (b"<!DOCTYPE", PAGE),
+        (b"<!", PAGE),
         (b"<html", PAGE),
     ];
     let place = Some(Place::Byte(0));

@@ -133,6 +133,7 @@ impl Additions<'_> {
 fn write_header(header: &Header, vertex: usize, steps: &[Step], ascii: bool, sink: &mut Sink) -> Result<(), Error> {
     let is_vertex = |kind| matches!(kind, LineKind::Element(owner) | LineKind::Property(owner, _) if owner == vertex);
     let last = header.lines.iter().rposition(|line| is_vertex(line.kind));
+    let new = &steps[header.elements[vertex].properties.len()..];
     sink.append(b"ply\n")?;
     for (number, line) in header.lines.iter().enumerate() {
         let put = match line.kind {
@@ -145,7 +146,7 @@ fn write_header(header: &Header, vertex: usize, steps: &[Step], ascii: bool, sin
         } else if put == Step::KEEP {
             sink.line(line.text)?;
         }
-        let added = steps.iter().filter(|step| step.kind.is_none() && Some(number) == last).map(|step| step.put);
+        let added = new.iter().filter(|_| Some(number) == last).map(|step| step.put);
         for put in [put].into_iter().chain(added).filter(|put| *put < Step::KEEP) {
             sink.words(&[b"property float", ADDED[put].as_bytes()])?;
         }
