@@ -91,7 +91,6 @@ pub(crate) fn normals(
 
     let stage = progress.stage("vote", 0.5..0.6);
     let chosen = choose(&levels, &stage.part(0.0..0.4))?;
-    let base = levels.len() - 1;
     let mut run = Run { batch: BATCH.max(count / 8), normals: &normals, cubes: 0, surfaces: 0, chosen_by: [0; SIZES] };
     let rough = run.settle(&levels, &chosen, 0, &stage.part(0.4..1.0))?;
     let mut noises = Vec::new();

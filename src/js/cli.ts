@@ -121,8 +121,8 @@ function wholeNumber(option: string, value: string, least = 1): number {
 
 function parseOrient(value: string): Task['orient'] {
   if (value === 'none' || value === 'consistent' || value === 'outward' || value === 'scanner') return value;
-  const [how, place] = value.split('=');
-  if (place === undefined || (how !== 'viewpoint' && how !== 'up'))
+  const [how, place, rest] = value.split('=');
+  if (place === undefined || rest !== undefined || (how !== 'viewpoint' && how !== 'up'))
     throw new UsageError(
       `--orient is ${value}; wanted none, consistent, outward, scanner, viewpoint=x,y,z or up=x,y,z`,
     );
@@ -322,6 +322,13 @@ function surfaces({ count, largest }: Report['components'] = { count: 0, largest
   if (count > shown.length) shown.push(`${(count - shown.length).toLocaleString('en')} smaller`);
   return shown.map((text, i) => [i === 0 ? 'surfaces' : '', text]);
 }
+
+// Who reads the report may have had enough of it, as `head` has; anything else is told like other failures.
+process.stdout.on('error', (error: NodeJS.ErrnoException) => {
+  if (error.code === 'EPIPE') return;
+  process.stderr.write(`bilinormal: ${plain(error)}\n`);
+  process.exitCode = 1;
+});
 
 try {
   const task = parse(process.argv.slice(2));
