@@ -179,6 +179,16 @@ fn bodies_that_touch_or_cross_all_face_outwards() {
     }
 }
 
+/// Between cubes that touch at an edge only there is a gap, but nothing to be seen through it.
+#[test]
+fn what_is_enclosed_sees_no_air() {
+    let both = joined([sphere(200_000, 30), moved(sphere(50_000, 31), [0.0; 3], 0.5)]);
+    let result = orient(&both.points, Orient::Consistent);
+    assert_eq!(share_right(&result.normals, &both.normals), 1.0);
+    let sides: Vec<Side> = components(&result).iter().map(|component| component.side).collect();
+    assert_eq!(sides, [Side::Air, Side::Volume]);
+}
+
 /// In a box so large that a voxel of the air holds all of a body, one of them with a shell inside.
 #[test]
 fn far_bodies_face_outwards() {

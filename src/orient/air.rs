@@ -58,6 +58,8 @@ pub(super) fn sights(grid: &Grid, patches: &Patches, points: usize, stage: &Stag
     reserve(&mut sights.all, patches.all.len(), WHAT)?;
     for (cube, seen) in seen.into_iter().enumerate() {
         let seen = seen.into_inner();
+        // In one direction only: through a gap between cubes that touch at an edge.
+        let seen = if seen.count_ones() < 2 { 0 } else { seen };
         let open = openness(seen);
         for patch in &patches.all[patches.of_cube(cube)] {
             let along = |number: u32| (direction(number as usize).as_vec3().normalize().dot(patch.normal) / HALF).abs();
