@@ -30,6 +30,15 @@ pub(super) struct Sights {
     pub all: Vec<f32>,
 }
 
+impl Sights {
+    /// For each patch what speaks for its normal to point outwards: its exposure, less where it sees the open from both sides,
+    /// as ground does.
+    pub fn evidence(&self) -> impl Iterator<Item = f32> {
+        let share = |(&exposure, &all): (&f32, &f32)| exposure * (exposure.abs() / all.max(f32::MIN_POSITIVE));
+        self.exposure.iter().zip(&self.all).map(share)
+    }
+}
+
 /// Looks out from every patch.
 ///
 /// A patch looks into the open in a direction in which no voxel (a cube, or more in a large empty box) between its own and
@@ -269,6 +278,15 @@ fn box_round(bricks: &[IVec3], share: f64, places: &mut Vec<i32>) -> (IVec3, IVe
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_sees_the_open_from_both_sides_says_little() {
+        let sights = Sights { exposure: vec![0.9, -0.2, 0.0], all: vec![0.9, 2.0, 0.0] };
+        let evidence: Vec<f32> = sights.evidence().collect();
+        assert_eq!(evidence[0], 0.9);
+        assert!((-0.03..0.0).contains(&evidence[1]), "{evidence:?}");
+        assert_eq!(evidence[2], 0.0);
+    }
 
     #[test]
     fn what_is_open_to_both_sides_is_open_to_none() {

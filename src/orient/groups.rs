@@ -1,6 +1,7 @@
 //! The signs that agree best with all evidence: of groups, merged from the strongest evidence to the weakest, then of what
 //! they consist of.
 
+use super::air::Sights;
 use super::links::{GRAPH, Link, Links};
 use crate::error::Error;
 use crate::points::{filled, starts};
@@ -32,20 +33,20 @@ struct Level {
 
 impl Groups {
     /// Rounds of Boruvka's: every group merges with the one that it has the strongest evidence for or against, and the
-    /// evidence between the merged ones is added up, so that many weak links outvote a strong wrong one. `exposure` is what
-    /// speaks for a patch not to be flipped. A round at least halves the groups that have evidence enough to merge, and few
+    /// evidence between the merged ones is added up, so that many weak links outvote a strong wrong one. `sights` tell
+    /// what speaks for a patch not to be flipped. A round at least halves the groups that have evidence enough to merge, and few
     /// get it later: linear in the links but for odd clouds, and never more than [`ROUNDS`] times as long.
-    pub fn of(mut links: Links, exposure: &[f32], stage: &Stage) -> Result<Self, Error> {
+    pub fn of(mut links: Links, sights: &Sights, stage: &Stage) -> Result<Self, Error> {
         let patches = links.len();
         let mut levels = Vec::new();
         let (mut own, mut component) = (filled(0.0, patches, GRAPH)?, filled(0u32, patches, GRAPH)?);
         let mut sizes = filled(1, patches, GRAPH)?;
-        own.copy_from_slice(exposure);
+        own.iter_mut().zip(sights.evidence()).for_each(|(own, evidence)| *own = evidence);
         component.iter_mut().zip(0..).for_each(|(component, one)| *component = one);
         for _ in 0..ROUNDS {
             let done = |groups: usize| 1.0 - groups as f64 / patches.max(1) as f64;
             stage.tell(done(own.len()))?;
-            let Some(Merging { group, flipped, groups }) = merge(&links, &sizes)? else { break };
+            let Some(Merging { group, flipped, groups }) = merge(&links, &own, &sizes)? else { break };
             stage.tell(done((own.len() + groups) / 2))?;
             let (merged, sums) = gather(&links, &own, &group, &flipped, groups)?;
             let mut counts = filled(0, groups, GRAPH)?;
@@ -67,15 +68,13 @@ impl Groups {
         self.own.len()
     }
 
-    /// Whether to flip each patch, so that the sum of all evidence becomes large. What speaks for the patches of a group adds
-    /// up like its area, the evidence of its neighbours only like its rim: beyond `span` patches the former is made to grow
-    /// like the rim too. Linear in the links.
-    pub fn signs(&self, span: f32, stage: &Stage) -> Result<Vec<bool>, Error> {
-        let mut flipped = self.descend(span, 1.0, &stage.part(0.0..0.4))?;
+    /// Whether to flip each patch, so that the sum of all evidence becomes large. Linear in the links.
+    pub fn signs(&self, stage: &Stage) -> Result<Vec<bool>, Error> {
+        let mut flipped = self.descend(f32::INFINITY, 1.0, &stage.part(0.0..0.4))?;
         let Some(Level { links, own, .. }) = self.levels.first() else { return Ok(flipped) };
         // Flipping one small group after the other does not reach a far better choice behind worse ones, as where both
         // sides of a thin noisy wall were taken for one.
-        let bold = self.descend(span, BOLDNESS, &stage.part(0.4..0.8))?;
+        let bold = self.descend(f32::INFINITY, BOLDNESS, &stage.part(0.4..0.8))?;
         // Both were mended last of all.
         if bold == flipped {
             return Ok(flipped);
@@ -91,6 +90,12 @@ impl Groups {
         }
         mend(links, &|one| own[one], &mut flipped)?;
         Ok(flipped)
+    }
+
+    /// The same where what speaks for a sign by itself may mislead. For the patches of a group that adds up like its area, the
+    /// evidence of its neighbours only like its rim: beyond `span` patches the former is made to grow like the rim too.
+    pub fn cautious_signs(&self, span: f32, stage: &Stage) -> Result<Vec<bool>, Error> {
+        self.descend(span, 1.0, stage)
     }
 
     /// From the components to the patches: whatever gains by being flipped is. `trust` is the weight of what speaks for a sign
@@ -148,30 +153,25 @@ struct Merging {
     groups: usize,
 }
 
-/// Merges each with the one that it has the strongest evidence for or against. `None` when no two are linked any more.
+/// Merges each with the one that it has the [`strongest`] evidence for or against. `None` when no two are linked any more.
 #[inline(never)]
-fn merge(links: &Links, sizes: &[u32]) -> Result<Option<Merging>, Error> {
+fn merge(links: &Links, own: &[f32], sizes: &[u32]) -> Result<Option<Merging>, Error> {
     let count = links.len();
     // Towards the root of the group, and whether flipped against it.
     let mut parents = filled((0u32, false), count, GRAPH)?;
     parents.iter_mut().zip(0..).for_each(|(parent, one)| parent.0 = one);
     let mut is_merged = false;
-    for one in 0..count {
-        let mut best = Link { to: 0, evidence: 0.0 };
-        for &link in links.from(one) {
-            let (more, most) = (link.evidence.abs(), best.evidence.abs());
-            if more > most || (more == most && link.to < best.to) {
-                best = link;
+    for at_any_price in [false, true] {
+        for one in 0..count {
+            let Some(best) = strongest(links, own, sizes, one, at_any_price) else { continue };
+            let ((a, a_flipped), (b, b_flipped)) = (root(&mut parents, one as u32), root(&mut parents, best.to));
+            if a != b {
+                parents[a.max(b) as usize] = (a.min(b), a_flipped ^ b_flipped ^ (best.evidence < 0.0));
+                is_merged = true;
             }
         }
-        let size = sizes[one].min(sizes[best.to as usize]);
-        if best.evidence.abs() <= TOUCH * (size as f32).sqrt() {
-            continue;
-        }
-        let ((a, a_flipped), (b, b_flipped)) = (root(&mut parents, one as u32), root(&mut parents, best.to));
-        if a != b {
-            parents[a.max(b) as usize] = (a.min(b), a_flipped ^ b_flipped ^ (best.evidence < 0.0));
-            is_merged = true;
+        if is_merged {
+            break;
         }
     }
     if !is_merged {
@@ -187,6 +187,24 @@ fn merge(links: &Links, sizes: &[u32]) -> Result<Option<Merging>, Error> {
         flipped[one] = is_flipped;
     }
     Ok(Some(Merging { group, flipped, groups: groups as usize }))
+}
+
+/// The link of one with the strongest evidence, less what speaks for the signs of the two by themselves and would be lost, as
+/// where bodies touch: what gains nothing is left until `at_any_price`, so that these are whole before they merge.
+fn strongest(links: &Links, own: &[f32], sizes: &[u32], one: usize, at_any_price: bool) -> Option<Link> {
+    let (mut best, mut most) = (None, if at_any_price { f32::NEG_INFINITY } else { 0.0 });
+    for &link in links.from(one) {
+        let (to, evidence) = (link.to as usize, link.evidence.abs());
+        let is_contrary = own[one] * own[to] * link.evidence < 0.0;
+        let loss = if is_contrary { 2.0 * own[one].abs().min(own[to].abs()) } else { 0.0 };
+        let is_first = |best: Link| evidence - loss == most && link.to < best.to;
+        if (evidence - loss > most || best.is_some_and(is_first))
+            && evidence > TOUCH * (sizes[one].min(sizes[to]) as f32).sqrt()
+        {
+            (best, most) = (Some(link), evidence - loss);
+        }
+    }
+    best
 }
 
 /// The root of one, and whether it is flipped against that; halves the way there.

@@ -28,16 +28,16 @@ pub(super) const CLOSED: f64 = 0.5;
 impl Signs {
     /// Counts all that lies in the open.
     pub fn outward(groups: Groups, stage: &Stage) -> Result<Self, Error> {
-        let flipped = groups.signs(f32::INFINITY, stage)?;
+        let flipped = groups.signs(stage)?;
         Ok(Self { flipped, components: groups.components(), component: groups.component })
     }
 
     /// Counts all that lies in the open for components that are closed then, and for others a share.
     pub fn consistent(groups: Groups, sights: &Sights, stage: &Stage) -> Result<Self, Error> {
-        let mut flipped = groups.signs(f32::INFINITY, &stage.part(0.0..0.5))?;
+        let mut flipped = groups.signs(&stage.part(0.0..0.5))?;
         let is_closed = closed(&groups, sights, &flipped)?;
         if is_closed.contains(&false) {
-            let cautious = groups.signs(SPAN, &stage.part(0.5..1.0))?;
+            let cautious = groups.cautious_signs(SPAN, &stage.part(0.5..1.0))?;
             for ((flipped, cautious), &component) in flipped.iter_mut().zip(cautious).zip(&groups.component) {
                 if !is_closed[component as usize] {
                     *flipped = cautious;
