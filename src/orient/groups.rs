@@ -34,8 +34,8 @@ struct Level {
 impl Groups {
     /// Rounds of Boruvka's: every group merges with the one that it has the strongest evidence for or against, and the
     /// evidence between the merged ones is added up, so that many weak links outvote a strong wrong one. `sights` tell
-    /// what speaks for a patch not to be flipped. A round at least halves the groups that have evidence enough to merge, and few
-    /// get it later: linear in the links but for odd clouds, and never more than [`ROUNDS`] times as long.
+    /// what speaks for a patch not to be flipped. A round at least halves the groups that gain by merging; few do so later,
+    /// or wait until none does: linear in the links but for odd clouds, and never more than [`ROUNDS`] times as long.
     pub fn of(mut links: Links, sights: &Sights, stage: &Stage) -> Result<Self, Error> {
         let patches = links.len();
         let mut levels = Vec::new();
