@@ -165,6 +165,22 @@ test('standard input and devices', { skip: process.platform === 'win32' }, () =>
   assert.ok(statSync('/dev/null').isCharacterDevice());
 });
 
+test(
+  'a reader that leaves early is no failure, and one that cannot take the report is told',
+  { skip: process.platform !== 'linux' },
+  () => {
+    const told = (to) => {
+      const command = `"${process.execPath}" "${cli}" sphere.ply -o told.ply ${to}; echo $?`;
+      const { stdout, stderr } = spawnSync('bash', ['-c', command], { cwd: folder, encoding: 'utf8', timeout: 60000 });
+      return { status: stdout.trim(), stderr };
+    };
+    assert.deepEqual(told('| true; echo "${PIPESTATUS[0]}" >&2'), { status: '0', stderr: '0\n' });
+    const full = told('> /dev/full');
+    assert.equal(full.status, '1');
+    assert.equal(full.stderr, 'bilinormal: no space left on the device\n');
+  },
+);
+
 test('--help prints the usage', () => {
   const { status, stdout, stderr } = run(['--help']);
   assert.deepEqual({ status, stderr }, { status: 0, stderr: '' });
@@ -189,6 +205,7 @@ test('wrong usage ends with 2, one line and a hint', () => {
     [['sphere.ply', '-o', 'b.ply', '--orient', 'up=0,0,0'], /orient\.up is 0, 0, 0; wanted/],
     [['a.ply', '-o', 'b.ply', '--orient', 'up=1,2'], /three numbers/],
     [['a.ply', '-o', 'b.ply', '--orient', 'down=1,2,3'], /down/],
+    [['a.ply', '-o', 'b.ply', '--orient', 'up=1,2,3=4'], /up=1,2,3=4/],
     [['a.ply', '-o', '-'], /standard output/],
   ];
   for (const [args, message] of cases) {
