@@ -1,9 +1,10 @@
 //! Which blocks of 4x4x4 cubes ("bricks") hold points, in memory that grows with the points and not with the box.
 
 use crate::error::Error;
-use crate::lattice::Lattice;
+use crate::lattice::{Lattice, mixed};
+use crate::lists::reserve;
 use crate::parallel::{self, Filling, Gathering};
-use crate::points::{CHUNK, reserve};
+use crate::points::CHUNK;
 use crate::progress::Stage;
 use crate::source::Source;
 use glam::{DVec3, IVec3};
@@ -250,8 +251,5 @@ fn sort(places: &mut Vec<[i64; 3]>) {
 }
 
 fn hash(brick: IVec3) -> usize {
-    let mixed = (brick.x as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
-        ^ (brick.y as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F)
-        ^ (brick.z as u64).wrapping_mul(0x1656_67B1_9E37_79F9);
-    (mixed >> 32) as usize
+    (mixed(brick.x as u64, brick.y as u64, brick.z as u64) >> 32) as usize
 }

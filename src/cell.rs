@@ -1,6 +1,7 @@
 //! The edge of the cubes.
 
 use crate::error::Error;
+use crate::lattice::mixed;
 use crate::number;
 use crate::order::{from_ordinal, ordinal, sort};
 use crate::parallel::{self, Gathering};
@@ -252,10 +253,7 @@ fn hash(cube: Cube) -> usize {
     // After this addition whole numbers stand in the last bits.
     const BIT: f64 = (3u64 << 51) as f64;
     let [x, y, z] = cube.map(|c| (f64::from_bits(c as u64) + BIT).to_bits());
-    let mixed = x.wrapping_mul(0x9E37_79B9_7F4A_7C15)
-        ^ y.wrapping_mul(0xC2B2_AE3D_27D4_EB4F)
-        ^ z.wrapping_mul(0x1656_67B1_9E37_79F9);
-    (mixed >> 50) as usize
+    (mixed(x, y, z) >> 50) as usize
 }
 
 /// Interleaves the lowest [`LEVELS`] bits of three numbers.

@@ -3,8 +3,9 @@
 use crate::bricks::{Bricks, OUTSIDE, set_bits};
 use crate::error::Error;
 use crate::lattice::{cube_centre, octant_in_brick};
+use crate::lists::reserve;
 use crate::parallel::{self, Filling, Scatter};
-use crate::points::{CHUNK, reserve};
+use crate::points::CHUNK;
 use crate::progress::Stage;
 use crate::source::Source;
 use bytemuck::{Pod, Zeroable};

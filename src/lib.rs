@@ -9,6 +9,19 @@
 //! file bytes -> points -> grid -> nodes or surfaces -> normals -> signs
 //!     ply       points    grid    nodes, adaptive      normals   orient
 //! ```
+//!
+//! ```
+//! use bilinormal::{Options, Points, Progress, estimate};
+//!
+//! // A square, as x0 y0 z0 x1 ...
+//! let positions: Vec<f32> = (0..100).flat_map(|i| [(i % 10) as f32, (i / 10) as f32, 0.0]).collect();
+//! let estimate = estimate(&Points::from_f32(&positions)?, &Options::default(), &Progress::silent())?;
+//! assert_eq!(estimate.normals[..3], [0.0, 0.0, 1.0]);
+//! # Ok::<(), bilinormal::Error>(())
+//! ```
+//!
+//! Features, both on by default: `parallel`, loops over rayon; `full`, all options but the default ones. Needs a nightly
+//! compiler, for the two features of the language below: that of `rust-toolchain.toml` in the repository.
 #![warn(missing_docs)]
 // What runs once in a call is compiled for size: the modules that browsers download must stay small.
 #![feature(optimize_attribute)]
@@ -25,6 +38,7 @@ mod estimate;
 mod grid;
 mod lanes;
 mod lattice;
+mod lists;
 mod median;
 mod nodes;
 mod normals;

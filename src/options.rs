@@ -32,7 +32,7 @@ pub enum Method {
     #[default]
     Bilinear,
     /// Principal component analysis of the k nearest points, the point itself among them: the paper's ENN. The exact
-    /// reference: six to fifty times as slow as cubes of one size.
+    /// reference: eight to sixty times as slow as cubes of one size.
     Knn,
     /// A quadratic surface through the point's neighbours in the elliptic Gabriel graph, of which the k nearest points
     /// are considered: the paper's EGG. For clean data of uneven density; noise goes straight into its normals.

@@ -1,10 +1,10 @@
-//! The one place that knows whether there are threads: the same loops run over rayon, or on the calling thread.
+//! Loops over threads: the same ones run over rayon, or where there is none on the calling thread.
 //!
 //! A stage cuts its arrays into tasks, each with its own disjoint pieces, and hands the tasks over. Results come back
 //! in the order of the tasks, so nothing depends on the number of threads.
 
 use crate::error::Error;
-use crate::points::reserve;
+use crate::lists::reserve;
 use std::marker::PhantomData;
 use std::mem::MaybeUninit;
 use std::ops::Range;
@@ -96,16 +96,6 @@ impl<T> Gathering<T> {
     pub fn all(self) -> Result<Vec<T>, Error> {
         self.items.into_inner().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-/// The items of all lists, one list after the other; or the memory that it lacked.
-pub(crate) fn concatenated<T>(lists: Vec<Vec<T>>, what: &str) -> Result<Vec<T>, Error> {
-    let mut all = Vec::new();
-    reserve(&mut all, lists.iter().map(Vec::len).sum(), what)?;
-    for mut list in lists {
-        all.append(&mut list);
-    }
-    Ok(all)
 }
 
 /// A list that tasks fill, each item once and in any order. Not zeroed before: that would be a pass over the memory by

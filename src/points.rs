@@ -1,6 +1,7 @@
 //! Positions relative to a double-precision origin.
 
 use crate::error::Error;
+use crate::lists::reserve;
 use crate::order::{from_ordinal, ordinal, sort};
 use crate::parallel;
 use crate::power::{exp2, log2};
@@ -10,7 +11,7 @@ use std::borrow::Cow;
 use std::sync::{Mutex, PoisonError};
 
 /// How many points a robust look at a cloud samples.
-const SAMPLE: usize = 4096;
+pub(crate) const SAMPLE: usize = 4096;
 
 /// How many points a task takes: enough to be worth a task, few enough to stay in a cache.
 pub(crate) const CHUNK: usize = 1 << 14;
@@ -27,12 +28,18 @@ pub struct Points<'a> {
 
 impl<'a> Points<'a> {
     /// Borrows `x0 y0 z0 x1 ...`; nothing is copied. Costs nothing.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the length is no multiple of 3.
     pub fn from_f32(coordinates: &'a [f32]) -> Result<Self, Error> {
         check_length(coordinates.len())?;
         Ok(Self { positions: Cow::Borrowed(cast_slice(coordinates)), origin: DVec3::ZERO, unit: 1.0 })
     }
 
     /// Takes over `x0 y0 z0 x1 ...`, and gives back what room there is for more. Costs nothing without that.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the length is no multiple of 3.
     pub fn from_vec(coordinates: Vec<f32>) -> Result<Points<'static>, Error> {
         check_length(coordinates.len())?;
         let positions = bytemuck::cast_slice_box(coordinates.into_boxed_slice()).into_vec();
@@ -40,6 +47,9 @@ impl<'a> Points<'a> {
     }
 
     /// Subtracts an origin near the bulk of the points, then rounds: 12 bytes a point of memory, one pass.
+    ///
+    /// # Errors
+    /// [`Error::Input`] if the length is no multiple of 3, [`Error::Limit`] for too little memory.
     pub fn from_f64(coordinates: &[f64]) -> Result<Points<'static>, Error> {
         check_length(coordinates.len())?;
         let points: &[DVec3] = cast_slice(coordinates);
@@ -89,47 +99,6 @@ fn check_length(length: usize) -> Result<(), Error> {
         return Ok(());
     }
     Err(Error::Input(format!("positions has {length} numbers; wanted a multiple of 3 (x y z of each point)")))
-}
-
-/// Takes memory for `count` more items, or says how much was needed.
-pub(crate) fn reserve<T>(items: &mut Vec<T>, count: usize, what: &str) -> Result<(), Error> {
-    let needed = count as u64 * size_of::<T>() as u64;
-    items.try_reserve_exact(count).map_err(|_| Error::memory(what, needed))
-}
-
-/// Takes memory for `count` more items, and for as many again as there are: for a list that grows bit by bit.
-pub(crate) fn grow<T>(items: &mut Vec<T>, count: usize, what: &str) -> Result<(), Error> {
-    let needed = (items.len() + count) as u64 * size_of::<T>() as u64;
-    items.try_reserve(count).map_err(|_| Error::memory(what, needed))
-}
-
-/// The same list without room to grow, or how much memory that lacked.
-pub(crate) fn fitted<T: Copy>(items: &[T], what: &str) -> Result<Vec<T>, Error> {
-    let mut fitted = Vec::new();
-    reserve(&mut fitted, items.len(), what)?;
-    fitted.extend_from_slice(items);
-    Ok(fitted)
-}
-
-/// A list of `count` times the same, or how much memory was needed.
-pub(crate) fn filled<T: Clone>(value: T, count: usize, what: &str) -> Result<Vec<T>, Error> {
-    let mut items = Vec::new();
-    reserve(&mut items, count, what)?;
-    items.resize(count, value);
-    Ok(items)
-}
-
-/// Where each of some runs starts, from their lengths; one more at the end.
-pub(crate) fn starts(lengths: &[u32], what: &str) -> Result<Vec<usize>, Error> {
-    let mut starts = Vec::new();
-    reserve(&mut starts, lengths.len() + 1, what)?;
-    let mut total = 0;
-    starts.push(0);
-    starts.extend(lengths.iter().map(|&length| {
-        total += length as usize;
-        total
-    }));
-    Ok(starts)
 }
 
 /// Numbers below `count`, one from each of at most `most` strides of one length.

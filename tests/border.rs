@@ -263,6 +263,7 @@ fn wrong_options_are_refused_with_what_came_and_what_was_wanted() {
         (r#"{ "orient": { "up": [0, 1] } }"#, r#"orient is {"up":[0,1]}; wanted 'none'"#),
         (r#"{ "orient": { "viewpoint": [0, 1, "2"] } }"#, r#"orient is {"viewpoint":[0,1,"2"]}; wanted"#),
         (r#"{ "curvature": 1 }"#, "curvature is 1; wanted true or false"),
+        (r#"{ "components": true }"#, "components are those of orient 'consistent' or 'outward'; wanted one of them"),
     ];
     for (json, wanted) in cases {
         let (code, message) = thrown(estimate(floats(&[]), false, &options(json), &nobody()));

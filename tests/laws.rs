@@ -436,6 +436,10 @@ fn options_out_of_range_are_refused_with_what_was_wanted() {
         let (unsupported, text) = text(Options { orient, ..Options::default() });
         assert!(!unsupported && text.contains("wanted three finite numbers"), "{text}");
     }
+    for orient in [Orient::None, Orient::Viewpoint([9.0; 3]), Orient::Up([0.0, 0.0, 1.0])] {
+        let (unsupported, text) = text(Options { orient, components: true, ..Options::default() });
+        assert!(!unsupported && text.contains("'consistent' or 'outward'; wanted one of them"), "{text}");
+    }
     assert!(matches!(Points::from_f32(&[1.0; 4]), Err(Error::Input(text)) if text.contains("multiple of 3")));
     assert!(matches!(Points::from_f64(&[1.0; 5]), Err(Error::Input(text)) if text.contains("multiple of 3")));
 }

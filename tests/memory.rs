@@ -55,8 +55,8 @@ fn peak_bytes_a_point() {
         ("far more cubes than points", &sphere, Cell::Size(1e-6), none, 130),
         ("auto with signs on a sphere", &sphere, Cell::Auto, consistent, 54),
         ("auto with signs, rough everywhere", &noisy, Cell::Auto, viewpoint, 72),
-        ("signs on a sphere", &sphere, Cell::Scale(1.5), consistent, 60),
-        ("signs with a stray point", &stray(3e6), Cell::Scale(1.5), consistent, 60),
+        ("signs on a sphere", &sphere, Cell::Scale(1.5), consistent, 54),
+        ("signs with a stray point", &stray(3e6), Cell::Auto, consistent, 54),
         ("signs in a solid, where patches are many", &noisy, Cell::Scale(1.5), consistent, 215),
     ] {
         let before = CURRENT.load(Relaxed);

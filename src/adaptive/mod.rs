@@ -15,9 +15,10 @@ mod vote;
 
 use crate::error::Error;
 use crate::lattice::{self, Lattice};
+use crate::lists::{grow, reserve};
 use crate::median::median;
 use crate::normals::{Found, Normals};
-use crate::points::{Points, grow, reserve};
+use crate::points::Points;
 use crate::progress::{Progress, Stage};
 use crate::source::Source;
 use choose::{Chosen, choose};

@@ -6,9 +6,9 @@ mod select;
 mod tree;
 
 use crate::error::Error;
+use crate::lists::reserve;
 use crate::normals::{Found, Normals};
 use crate::parallel;
-use crate::points::reserve;
 use crate::progress::Stage;
 use glam::Vec3;
 use tree::Search;

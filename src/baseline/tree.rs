@@ -8,8 +8,9 @@
 
 use super::select::select;
 use crate::error::Error;
+use crate::lists::reserve;
 use crate::parallel::Scatter;
-use crate::points::{Bounds, Bulk, Points, reserve};
+use crate::points::{Bounds, Bulk, Points};
 use crate::power::{exp2, log2};
 use crate::progress::Stage;
 use bytemuck::Zeroable;

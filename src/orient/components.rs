@@ -1,13 +1,12 @@
 //! Which side of each surface is its outside.
 
 use super::air::Sights;
-use super::groups::signed;
-use super::patches::Patches;
+use super::patches::{Patches, signed};
 use super::signs::{CLOSED, Signs};
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::lattice::{BRICK, cube_centre};
-use crate::points::{filled, grow, reserve};
+use crate::lists::{filled, grow, reserve};
 use glam::DVec3;
 use std::cmp::Reverse;
 

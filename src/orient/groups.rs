@@ -3,11 +3,11 @@
 
 use super::air::Sights;
 use super::links::{GRAPH, Link, Links};
+use super::patches::signed;
 use crate::error::Error;
-use crate::points::{filled, starts};
+use crate::lists::{filled, starts};
 use crate::power::exp2;
 use crate::progress::Stage;
-use std::ops::Neg;
 
 /// Groups of patches that agree, groups of such groups, and so on, up to the components, which at most touch each other.
 pub(super) struct Groups {
@@ -127,10 +127,6 @@ const ROUNDS: usize = 40;
 
 /// How much more than by rights the second choice trusts what speaks for a sign by itself.
 const BOLDNESS: f32 = 3.0;
-
-pub(super) fn signed<T: Neg<Output = T>>(is_flipped: bool, one: T) -> T {
-    if is_flipped { -one } else { one }
-}
 
 /// What the evidence says to the sign of one, given those of the others.
 fn support(links: &Links, flipped: &[bool], one: usize) -> f32 {

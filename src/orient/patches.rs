@@ -1,16 +1,15 @@
 //! The points of a cube, parted into those that lie on one piece of surface.
 
-use super::groups::signed;
 use crate::error::Error;
 use crate::grid::{Grid, Placed};
 use crate::lattice::cube_centre;
+use crate::lists::{concatenated, grow, reserve, starts};
 use crate::order::sort_few;
-use crate::parallel::{Filling, concatenated};
-use crate::points::{grow, reserve, starts};
+use crate::parallel::Filling;
 use crate::progress::Stage;
 use glam::Vec3;
 use std::mem::MaybeUninit;
-use std::ops::Range;
+use std::ops::{Neg, Range};
 
 /// A few points of one cube with nearly the same normal and plane.
 #[derive(Clone, Copy, Debug)]
@@ -198,6 +197,12 @@ fn whole(points: &[Placed], normals: &[Vec3], centre: Vec3, thickness: f32) -> O
 #[inline(always)]
 pub(super) fn aligned(normal: Vec3, other: Vec3) -> Vec3 {
     signed(other.dot(normal) < 0.0, normal)
+}
+
+/// The same, or its opposite.
+#[inline(always)]
+pub(super) fn signed<T: Neg<Output = T>>(is_flipped: bool, one: T) -> T {
+    if is_flipped { -one } else { one }
 }
 
 /// Orders places in a brick by x, then y, then z. Numbers that are not negative have their bits in their order.

@@ -1,9 +1,10 @@
 //! How much the open air counts against the edges of a surface, and the signs that come of it.
 
 use super::air::Sights;
-use super::groups::{Groups, signed};
+use super::groups::Groups;
+use super::patches::signed;
 use crate::error::Error;
-use crate::points::filled;
+use crate::lists::filled;
 use crate::progress::Stage;
 
 /// What errors call the memory of all this.

@@ -7,14 +7,12 @@ use super::scalar::bits;
 use super::{PointCloud, ReadOptions, tasks};
 use crate::error::Error;
 use crate::parallel::{self, Scatter};
-use crate::points::{choose_origin, spread_in};
+use crate::points::{SAMPLE, choose_origin, spread_in};
 use crate::progress::Progress;
 use glam::DVec3;
 
 /// Points whose columns are read one after another while their bytes are in the nearest cache.
 const BLOCK: usize = 1 << 10;
-/// The points that are looked at to choose an origin; the same number that `choose_origin` looks at.
-const SAMPLE: usize = 4096;
 
 /// Reads the points of a PLY file.
 ///

@@ -1,7 +1,7 @@
 //! Blocks of memory that JavaScript fills and reads through views.
 
 use crate::error::Error;
-use crate::points::fitted;
+use crate::lists::fitted;
 use bytemuck::AnyBitPattern;
 use wasm_bindgen::prelude::*;
 

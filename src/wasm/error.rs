@@ -32,8 +32,8 @@ impl From<Error> for JsValue {
                 "limit"
             }
             Error::Input(_) => "input",
-            Error::Unsupported(_) => "unsupported",
-            Error::Cancelled => "cancelled",
+            // Nothing is cancelled here: the border's progress always goes on.
+            Error::Unsupported(_) | Error::Cancelled => "unsupported",
         };
         set(&thrown, "code", code);
         thrown.into()
