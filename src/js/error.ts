@@ -13,7 +13,7 @@ export interface ErrorDetails {
   available?: number;
 }
 
-/** Every error of this package, except that an abort rejects with `signal.reason`. */
+/** What the package's promises reject with, but for an abort, `signal.reason`, and what the caller's own functions throw. */
 export class BilinormalError extends Error implements ErrorDetails {
   // Minified code gives classes other names.
   static override readonly name = 'BilinormalError';

@@ -1,4 +1,4 @@
-// An estimator: its workers, and the calls that wait for them.
+// An estimator: its two workers, and the calls that wait for each.
 import { buffersOf } from './buffers.js';
 import { BilinormalError } from './error.js';
 import { detect } from './features.js';
@@ -26,15 +26,27 @@ interface Job {
 
 /** Starts an estimator; resolves when its worker is ready. */
 export async function createEstimator(host: Host, options: EstimatorOptions = {}): Promise<Estimator> {
+  want(options, 'options', options, 'an object');
   const { threads = 'auto', memoryMaxMiB = 4096 } = options;
   const isWhole = (value: number, from: number, to: number) => Number.isInteger(value) && from <= value && value <= to;
   want(threads === 'auto' || isWhole(threads, 1, 256), 'threads', threads, `'auto' or 1 to 256`);
   want(isWhole(memoryMaxMiB, 16, 4096), 'memoryMaxMiB', memoryMaxMiB, '16 to 4096');
   // With a slash at its end, for it names a folder.
-  const wasmUrl = options.wasmUrl && new URL(`${options.wasmUrl}`.replace(/\/*$/, '/'), host.base()).href;
+  const wasmUrl = await taken(
+    () => options.wasmUrl && new URL(`${options.wasmUrl}`.replace(/\/*$/, '/'), host.base()).href,
+  );
   const [estimator, ready] = openEstimator(host, { threads, memoryMaxMiB, wasmUrl });
   await ready();
   return estimator;
+}
+
+/** What comes of arguments; what JavaScript itself finds wrong with their kinds is an `input` error. */
+async function taken<T>(take: () => T | Promise<T>): Promise<T> {
+  try {
+    return await take();
+  } catch (error) {
+    throw error instanceof TypeError ? new BilinormalError('input', error.message) : error;
+  }
 }
 
 /** Calls that wait for one worker, which starts with the first of them. */
@@ -137,7 +149,7 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
     };
     let abort!: () => void;
     try {
-      const call = await prepare(tell);
+      const call = await taken(() => prepare(tell));
       signal?.throwIfAborted();
       if (disposed) throw disposed;
       let job!: Job;

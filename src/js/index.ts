@@ -1,6 +1,6 @@
 /**
  * Normals of large point clouds, computed in a worker by WebAssembly: the entry for browsers. Importing it does
- * nothing; the first call starts a worker that all calls share.
+ * nothing; the first call starts a worker that later calls share, and the first that needs the full module another.
  *
  * Sub-paths of the package: `bilinormal/three` (a point material), `bilinormal/worker` (the worker's script),
  * `bilinormal/single.wasm`, `single-full.wasm`, `threads.wasm` and `threads-full.wasm` (the wasm modules, for
@@ -28,7 +28,7 @@ export const readPointCloud = api.readPointCloud;
  * kept and existing normals replaced, or from a cloud alone.
  */
 export const writePly = api.writePly;
-/** An estimator with a worker of its own, and its own choice of threads, memory and place of the wasm files. */
+/** An estimator with workers of its own, and its own choice of threads, memory and place of the wasm files. */
 export const createEstimator = api.createEstimator;
 /** What this engine and this page allow, without starting anything. */
 export const features = api.features;

@@ -20,7 +20,7 @@ export interface Start extends EstimatorOptions {
   kind: 'start';
   /** Name of the BroadcastChannel on which a thread tells its death: the worker that owns it cannot, it waits for it. */
   channel: string;
-  /** Whether to load the module with what few callers need: the baselines, and the writing of files. */
+  /** Whether to load the module with what few callers need: all but reading, and estimating with the default options. */
   full?: boolean;
   /** Why there can be no threads, found out by the calling thread. */
   reason?: string;

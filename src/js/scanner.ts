@@ -1,5 +1,5 @@
-// Where a scan was taken from, if its file says so: for the command line and the page. Not in the package, which leaves
-// comments to its callers.
+// Where a scan was taken from, if its file says so: for the command line and the page. No function of the package, which
+// leaves comments to its callers.
 import type { PointCloud } from './types.js';
 
 /** Relative to the cloud's origin, as its positions are. */

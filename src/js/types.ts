@@ -16,7 +16,7 @@ export interface Progress {
 export interface EstimateOptions {
   /**
    * Default `'bilinear'`: surfaces on a grid of cubes, with cubes of one size the paper's method. The others are its
-   * baselines, six to fifty times as slow as cubes of one size: `'knn'` fits a plane to the k nearest points, `'egg'` a
+   * baselines, eight to sixty times as slow as cubes of one size: `'knn'` fits a plane to the k nearest points, `'egg'` a
    * curved surface to the neighbours in the elliptic Gabriel graph.
    */
   method?: 'bilinear' | 'knn' | 'egg';
@@ -172,7 +172,7 @@ export interface WriteOptions {
 }
 
 export interface EstimatorOptions {
-  /** Default `'auto'`: one for each processor, at most 16. 1 is the single-threaded build. */
+  /** 1 to 256 for each of the two workers; 1 is the single-threaded build. Default `'auto'`: one for each processor, at most 16. */
   threads?: number | 'auto';
   /**
    * A folder that holds `single.wasm` and `threads.wasm`, and for all but reading and the default options also
@@ -180,7 +180,7 @@ export interface EstimatorOptions {
    * themselves. A relative address counts from the page; in Node, from the working directory.
    */
   wasmUrl?: string | URL;
-  /** Most memory the wasm module may take, 16 to 4096. Default 4096, or the most that the engine grants. */
+  /** Most memory that either wasm module may take, 16 to 4096. Default 4096, or the most that the engine grants. */
   memoryMaxMiB?: number;
 }
 
@@ -193,12 +193,15 @@ export interface Features {
   reason?: string;
 }
 
-/** A worker with its queue. Calls wait for each other; each has its own progress and abort. */
+/**
+ * Calls wait for each other; each has its own progress and abort. What needs the full module (see `wasmUrl`) has a worker and
+ * a queue of its own: such a call and one of the others may run at once.
+ */
 export interface Estimator {
   estimateNormals(positions: Positions, options?: EstimateOptions): Promise<EstimateResult>;
   readPointCloud(source: Source, options?: ReadOptions): Promise<PointCloud>;
   writePly(cloud: PointCloud | Source, add: Additions, options?: WriteOptions): Promise<Blob>;
   features(): Promise<Features>;
-  /** Ends the worker and its threads; calls that are pending, and later ones, reject. */
+  /** Ends the workers and their threads; calls that are pending, and later ones, reject. */
   dispose(): void;
 }

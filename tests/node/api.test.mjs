@@ -260,7 +260,7 @@ test('one signal stops all calls that were given it, and only these', async (con
   assert.deepEqual([...new Set(told)], [1]);
 });
 
-test('concurrent calls queue, and each gets its own result and progress', async () => {
+test('concurrent calls of one kind queue, and each gets its own result and progress', async () => {
   const counts = [50000, 10, 3000, 0, 20000];
   const last = counts.map(() => 0);
   const results = await Promise.all(
@@ -335,6 +335,8 @@ test('no points, no normals', async () => {
 
 test('wrong arguments are input errors that say what came and what was wanted', async (context) => {
   const positions = sphere(10);
+  const locked = new Response('ply');
+  locked.body.getReader();
   const cases = [
     [() => estimateNormals([1, 2, 3]), /positions is Array\(3\); wanted a Float32Array or Float64Array/],
     [() => estimateNormals(undefined), /positions is undefined; wanted/],
@@ -363,6 +365,11 @@ test('wrong arguments are input errors that say what came and what was wanted', 
     [() => estimateNormals(positions, { method: 'knn', k: 1e10 }), /k is 10000000000; wanted .* to 4294967295/],
     [() => estimateNormals(positions, { curvature: 1 }), /curvature is 1; wanted true or false/],
     [() => createEstimator({ memoryMaxMiB: 5000 }), /memoryMaxMiB is 5000; wanted 16 to 4096/],
+    [() => createEstimator(null), /options is null; wanted an object/],
+    // What JavaScript itself finds wrong.
+    [() => createEstimator({ wasmUrl: 'http://[' }), /Invalid URL/],
+    [() => estimateNormals(positions, { k: 5n }), /BigInt/],
+    [() => readPointCloud(locked), /locked/],
   ];
   for (const [call, message] of cases) await assert.rejects(call, failing('input', message), `${call}`);
   await assert.rejects(
