@@ -18,8 +18,10 @@ export function setup({ browser = false } = {}) {
 }
 
 function node() {
-  if (Number(process.versions.node.split('.')[0]) < 20) {
-    throw new Failure(`this is Node ${process.versions.node}; wanted 20 or later, from https://nodejs.org`);
+  // What vite asks for; the package itself runs in every Node from 20 on.
+  const [major, minor] = process.versions.node.split('.').map(Number);
+  if (major < 20 || major === 21 || (major === 20 && minor < 19) || (major === 22 && minor < 12)) {
+    throw new Failure(`this is Node ${process.versions.node}; wanted 20.19, 22.12 or later, from https://nodejs.org`);
   }
 }
 
