@@ -50,8 +50,8 @@ pub struct Report {
     pub cell_size: f64,
     /// Edge of a cube, in multiples of the paper's L (Eq. 1).
     pub scale: f64,
-    /// How far the points lie off the surface, in units of the input: the deviation that half of the cubes of `cell_size`
-    /// do not exceed; 0 if there is no surface. Only [`Cell::Auto`] measures it.
+    /// How far the points lie off the surfaces that were chosen for them, in units of the input: the deviation that half of
+    /// them do not exceed, to 2 %; 0 if there is no surface. Only [`Cell::Auto`] measures it.
     pub noise: Option<f64>,
     /// The sizes of the neighbourhoods that [`Cell::Auto`] chose, the smallest first.
     pub scales: Vec<Scale>,

@@ -90,10 +90,16 @@ fn the_report_tells_noise_and_scales() {
         let report = run(&cloud.points, Cell::Auto).report;
         let expected = share * 2.0 * 3f64.sqrt();
         let noise = report.noise.unwrap();
-        assert!((noise - expected).abs() <= 2e-4 + 0.1 * expected, "{noise} instead of {expected}");
+        println!("noise {noise}, {expected} expected");
+        assert!((noise - expected).abs() <= 2e-4 + 0.06 * expected, "{noise} instead of {expected}");
         assert_eq!(report.scales.iter().map(|scale| scale.points).sum::<u64>(), report.points);
         assert!(report.scales.is_sorted_by(|a, b| 1.99 * a.cell_size < b.cell_size), "{:?}", report.scales);
     }
+    // What lies between two walls is none, though the cubes that are divided for them take it for that.
+    let mut walls = plane(100_000, 10, [0.0, 0.0, 1.0]);
+    walls.points.chunks_exact_mut(3).step_by(2).for_each(|point| point[2] += 0.04);
+    let noise = run(&walls.points, Cell::Auto).report.noise.unwrap();
+    assert!(noise < 2e-4, "{noise}");
     // More noise asks for larger neighbourhoods.
     let typical = |share| {
         let report = run(&sphere(100_000, 11).noisy(share, 12).points, Cell::Auto).report;

@@ -11,12 +11,12 @@ mod level;
 mod matrix;
 mod samples;
 mod surface;
+mod tally;
 mod vote;
 
 use crate::error::Error;
 use crate::lattice::{self, Lattice};
-use crate::lists::{grow, reserve};
-use crate::median::median;
+use crate::lists::grow;
 use crate::normals::{Found, Normals};
 use crate::points::Points;
 use crate::progress::{Progress, Stage};
@@ -24,6 +24,7 @@ use crate::source::Source;
 use choose::{Chosen, choose};
 use level::Level;
 use std::ops::Range;
+use tally::Tally;
 use vote::Vote;
 
 /// Normals, and what was decided.
@@ -33,7 +34,7 @@ pub(crate) struct Adaptive {
     pub cubes: u64,
     /// Those of them that rest on a surface.
     pub surfaces: u64,
-    /// The deviation of the points from the surfaces, in edges: half of the cubes have less.
+    /// The deviation of the points from the surfaces, in edges of the base: half of the points have less.
     pub noise: f64,
     /// Edges of the chosen cubes in edges of the base, and how many points took each. The smallest first.
     pub scales: Vec<(f64, u64)>,
@@ -92,23 +93,18 @@ pub(crate) fn normals(
 
     let stage = progress.stage("vote", 0.5..0.6);
     let chosen = choose(&levels, &stage.part(0.0..0.4))?;
-    let mut run = Run { batch: BATCH.max(count / 8), normals: &normals, cubes: 0, surfaces: 0, chosen_by: [0; SIZES] };
+    let tally = Tally::new();
+    let mut run = Run { batch: BATCH.max(count / 8), normals: &normals, tally: &tally, cubes: 0, surfaces: 0 };
     let rough = run.settle(&levels, &chosen, 0, &stage.part(0.4..1.0))?;
-    let mut noises = Vec::new();
-    reserve(&mut noises, chosen.len(), "the surfaces")?;
-    noises.extend(chosen.iter().filter(|chosen| chosen.is_some()).map(|chosen| chosen.noise));
-    let noise = f64::from(median(&noises)).sqrt();
-    drop((chosen, noises));
+    drop(chosen);
     lap("vote");
     run.divide(&mut levels, 0, &rough, &progress.stage("detail", 0.6..1.0))?;
     progress.update("detail", 1.0)?;
     lap("detail");
-    let Run { cubes, surfaces, chosen_by, .. } = run;
+    let Run { cubes, surfaces, .. } = run;
     // SAFETY: every point of the base was in a cube that was divided, or in one that was not.
     let found = unsafe { normals.complete() };
-    let edges = (0i32..).map(|i| 2f64.powi(i - DIVISIONS as i32));
-    let scales = edges.zip(chosen_by).filter(|&(_, points)| points > 0).collect();
-    Ok(Adaptive { found, cubes, surfaces, noise, scales })
+    Ok(Adaptive { found, cubes, surfaces, noise: tally.noise(), scales: tally.scales() })
 }
 
 /// What goes through all divisions.
@@ -116,10 +112,9 @@ struct Run<'a> {
     /// About how many points are divided at a time.
     batch: usize,
     normals: &'a Normals,
+    tally: &'a Tally,
     cubes: u64,
     surfaces: u64,
-    /// Points by the size of the cubes they rest on, from the smallest there can be.
-    chosen_by: [u64; SIZES],
 }
 
 impl Run<'_> {
@@ -134,14 +129,11 @@ impl Run<'_> {
         stage: &Stage,
     ) -> Result<Vec<bool>, Error> {
         let level = &levels[levels.len() - 1];
-        let vote = Vote { level, chosen, division, normals: self.normals };
-        let (rough, counts) = vote.run(stage)?;
+        let vote = Vote { level, chosen, division, normals: self.normals, tally: self.tally };
+        let rough = vote.run(stage)?;
         for (_, chosen) in chosen.iter().enumerate().filter(|&(cube, _)| level.is_wanted(cube) && !rough[cube]) {
             self.cubes += 1;
             self.surfaces += u64::from(chosen.is_some());
-        }
-        for (all, count) in self.chosen_by[DIVISIONS - division..].iter_mut().zip(counts) {
-            *all += count;
         }
         Ok(rough)
     }

@@ -1,11 +1,12 @@
 //! The normals of the points, from the surfaces of the cubes round them.
 
+use super::DIVISIONS;
 use super::around::Around;
 use super::choose::{Chosen, MISFIT};
 use super::level::Level;
 use super::matrix::{dot_lanes, times_lanes};
 use super::surface::Surface;
-use super::{DIVISIONS, SIZES};
+use super::tally::Tally;
 use crate::error::Error;
 use crate::grid::Placed;
 use crate::lanes::{inverse_root, load, root, transposed};
@@ -15,7 +16,6 @@ use crate::parallel::Filling;
 use crate::progress::Stage;
 use glam::{Vec3, Vec4};
 use std::f32::consts::FRAC_1_SQRT_2;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// How far a surface speaks, in edges: the deviation of a normal distribution.
 const SPEAK: f32 = 1.4;
@@ -63,21 +63,18 @@ pub(super) struct Vote<'a> {
     /// How often the cubes were divided.
     pub division: usize,
     pub normals: &'a Normals,
+    pub tally: &'a Tally,
 }
-
-/// How many points took their normal from cubes whose edge was doubled once, twice and so on.
-pub(super) type Counts = [u64; SIZES];
 
 impl Vote<'_> {
     /// Finds the normals of the points in the wanted cubes of the level, but not in those that are to be divided: answers
     /// which are.
     #[inline(never)]
-    pub fn run(&self, stage: &Stage) -> Result<(Vec<bool>, Counts), Error> {
+    pub fn run(&self, stage: &Stage) -> Result<Vec<bool>, Error> {
         let level = self.level;
         let rough = Filling::new(level.grid.cubes(), "the cubes")?;
-        let counts = [const { AtomicU64::new(0) }; SIZES];
         stage.run(level.grid.blocks.len(), &|block| {
-            let mut task = Task::new(self, &counts);
+            let mut task = Task::new(self);
             for (brick, cube, bit) in level.grid.cubes_in(block) {
                 // SAFETY: once for each cube.
                 unsafe { rough.write(cube, level.is_wanted(cube) && !task.settle(brick, cube, bit)) };
@@ -85,14 +82,13 @@ impl Vote<'_> {
             self.normals.add_resolved(task.resolved);
         })?;
         // SAFETY: these were all cubes.
-        Ok((unsafe { rough.complete() }, counts.map(AtomicU64::into_inner)))
+        Ok(unsafe { rough.complete() })
     }
 }
 
 /// One cube after the other.
 struct Task<'a> {
     vote: &'a Vote<'a>,
-    counts: &'a [AtomicU64; SIZES],
     writer: Writer<'a>,
     around: Around,
     near: Vec<(Vec3, usize)>,
@@ -101,9 +97,9 @@ struct Task<'a> {
 }
 
 impl<'a> Task<'a> {
-    fn new(vote: &'a Vote<'a>, counts: &'a [AtomicU64; SIZES]) -> Self {
+    fn new(vote: &'a Vote<'a>) -> Self {
         let writer = vote.normals.writer();
-        Self { vote, counts, writer, around: Around::new(), near: Vec::new(), ballot: Ballot::default(), resolved: 0 }
+        Self { vote, writer, around: Around::new(), near: Vec::new(), ballot: Ballot::default(), resolved: 0 }
     }
 
     /// Finds the normals of the points of a cube, unless it is to be divided: answers whether it was settled.
@@ -157,7 +153,7 @@ impl<'a> Task<'a> {
             self.resolved += count;
         }
         if own.is_some() {
-            self.counts[own.doublings as usize].fetch_add(count, Relaxed);
+            self.vote.tally.add(division, own, count);
         }
         true
     }

@@ -93,8 +93,8 @@ export interface Report {
   /** Edge of the cubes in multiples of the paper's L. */
   scale: number;
   /**
-   * How far the points lie off the surface, in the units of the input: the deviation that half of the cubes of `cellSize`
-   * do not exceed; 0 if there is no surface. Only with `cell: 'auto'`.
+   * How far the points lie off the surfaces that were chosen for them, in the units of the input: the deviation that half
+   * of them do not exceed, to 2 %; 0 if there is no surface. Only with `cell: 'auto'`.
    */
   noise?: number;
   /**
