@@ -223,6 +223,19 @@ fn a_strip_has_normals() {
     assert_eq!(run(&points, Cell::Auto).report.unresolved, 0);
 }
 
+/// Thirty cables side by side, three point spacings in radius and two apart: from afar a thick noisy sheet.
+#[test]
+fn cables_are_no_noise() {
+    let mut random = Random(22);
+    let cables = Cloud::of((0..100_000).map(|i| {
+        let (along, around) = (random.unit(), TAU * random.unit());
+        let (out, up) = (around.cos(), around.sin());
+        (turn([300.0 * along, 14.0 * f64::from(i % 30) + 5.0 * out, 5.0 * up]), turn([0.0, out, up]))
+    }));
+    let error = root_mean_square(&errors(&cables).0);
+    assert!(error < 4.5, "{error} degrees");
+}
+
 /// Unit spheres of some points each.
 fn balls(count: usize, points: usize, place: impl Fn(usize) -> [f64; 3]) -> Cloud {
     let mut random = Random(20);
