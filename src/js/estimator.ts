@@ -149,6 +149,7 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
     };
     let abort!: () => void;
     try {
+      if (disposed) throw disposed;
       const call = await taken(() => prepare(tell));
       signal?.throwIfAborted();
       if (disposed) throw disposed;

@@ -10,11 +10,7 @@ import { makeApi } from './api.js';
 import { starter } from './link.js';
 
 const api = /* @__PURE__ */ makeApi({
-  startWorker: starter(
-    './worker.js',
-    import.meta.url,
-    () => new Worker(new URL('./worker.js', import.meta.url), { type: 'module' }),
-  ),
+  startWorker: starter(() => new Worker(new URL('./worker.js', import.meta.url), { type: 'module' })),
   files: false,
   base: () => globalThis.document?.baseURI ?? location.href,
 });

@@ -1,15 +1,11 @@
 // Browser workers as links, wherever the package was loaded from.
 import type { StartWorker } from './protocol.js';
 
-/**
- * How to start a worker: `direct` does it, in the one form that bundlers know. But where `module`, the script that asks
- * for it, was loaded from another origin, browsers refuse that; then a Blob of this origin imports `file`.
- */
+/** How to start a worker: `direct` does it, in the one form that bundlers know and put their own address into. */
 export const starter =
-  (file: string, module: string, direct: () => Worker): StartWorker =>
+  (direct: () => Worker): StartWorker =>
   (receive, fail) => {
-    const worker =
-      /^http/.test(module) && new URL(module).origin !== origin ? viaBlob(new URL(file, module)) : direct();
+    const worker = fromAnywhere(direct);
     worker.onmessage = (event) => receive(event.data);
     // Without a message: the script did not load, or what it sent cannot be read.
     worker.onmessageerror = worker.onerror = (event: any) => {
@@ -23,9 +19,22 @@ export const starter =
     };
   };
 
-function viaBlob(script: URL): Worker {
-  const url = URL.createObjectURL(new Blob([`import ${JSON.stringify(script)}`], { type: 'text/javascript' }));
-  const worker = new Worker(url, { type: 'module' });
-  worker.addEventListener('message', () => URL.revokeObjectURL(url), { once: true });
-  return worker;
+/**
+ * The worker that `direct` starts. Browsers refuse scripts from another origin, where the package or a bundle may lie: then a
+ * Blob of this origin imports the script. Only the call itself has its address, so that is where it is seen.
+ */
+function fromAnywhere(direct: () => Worker): Worker {
+  const Own = Worker;
+  self.Worker = class extends Own {
+    constructor(script: any, options?: WorkerOptions) {
+      const isForeign = /^http/.test(script) && new URL(script).origin !== origin;
+      const code = options?.type ? `import '${script}'` : `importScripts('${script}')`;
+      super(isForeign ? URL.createObjectURL(new Blob([code], { type: 'text/javascript' })) : script, options);
+    }
+  };
+  try {
+    return direct();
+  } finally {
+    self.Worker = Own;
+  }
 }

@@ -34,7 +34,10 @@ uniform float size;
 uniform float pixels;
 uniform float pixelRatio;
 uniform float viewportHeight;
+// Where \`vertexColors\` is set, three declares it.
+#if !defined(USE_COLOR) && !defined(USE_COLOR_ALPHA)
 attribute vec4 color;
+#endif
 varying vec3 vNormal;
 varying vec3 vColor;
 varying vec3 vToCamera;

@@ -172,7 +172,10 @@ export interface WriteOptions {
 }
 
 export interface EstimatorOptions {
-  /** 1 to 256 for each of the two workers; 1 is the single-threaded build. Default `'auto'`: one for each processor, at most 16. */
+  /**
+   * 1 to 256 for each of the two workers; 1 is the single-threaded build. Default `'auto'`: one for each processor, at most
+   * 16.
+   */
   threads?: number | 'auto';
   /**
    * A folder that holds `single.wasm` and `threads.wasm`, and for all but reading and the default options also
@@ -202,6 +205,6 @@ export interface Estimator {
   readPointCloud(source: Source, options?: ReadOptions): Promise<PointCloud>;
   writePly(cloud: PointCloud | Source, add: Additions, options?: WriteOptions): Promise<Blob>;
   features(): Promise<Features>;
-  /** Ends the workers and their threads; calls that are pending, and later ones, reject. */
+  /** Ends the workers and their threads; calls that wait or run, and later ones, reject; of downloads, when they have ended. */
   dispose(): void;
 }

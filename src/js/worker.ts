@@ -4,11 +4,7 @@ import { serve } from './serve.js';
 
 const receive = serve((reply, transfer) => postMessage(reply, { transfer }), {
   processors: navigator.hardwareConcurrency,
-  startThread: starter(
-    './thread.js',
-    import.meta.url,
-    () => new Worker(new URL('./thread.js', import.meta.url), { type: 'module' }),
-  ),
+  startThread: starter(() => new Worker(new URL('./thread.js', import.meta.url), { type: 'module' })),
   async load(url) {
     const response = await fetch(url);
     if (!response.ok) throw new Error(`HTTP status ${response.status}`);

@@ -1,7 +1,7 @@
 // The packed package in a browser, loaded in each way that API.md promises: plain files on the page's own origin, a
 // host on another origin, and a bundle; with and without isolation.
 import assert from 'node:assert/strict';
-import { existsSync, mkdirSync, readFileSync, symlinkSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdirSync, readFileSync, renameSync, symlinkSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { chromium } from 'playwright-core';
@@ -123,7 +123,7 @@ test('files on another origin', async () => {
   checkPlain(await use(await open(folder, {})));
 });
 
-test('a bundle by Vite, with its default settings', async () => {
+test('a bundle by Vite, with its default settings, on the own origin and on another', async () => {
   const { build } = await import('vite');
   const folder = join(project, 'app');
   mkdirSync(folder);
@@ -134,6 +134,16 @@ test('a bundle by Vite, with its default settings', async () => {
   checkIsolated(isolated);
   assert.equal(isolated.hash, hash);
   checkPlain(await use(await open(join(folder, 'dist'), {})));
+
+  // Its page here, all else on another origin.
+  const [assets, page] = [join(folder, 'assets'), join(folder, 'page')];
+  [assets, page].forEach((made) => mkdirSync(made));
+  await build({ root: folder, logLevel: 'error', base: await open(assets, anyOrigin), build: { outDir: assets } });
+  renameSync(join(assets, 'index.html'), join(page, 'index.html'));
+  const elsewhere = await use(await open(page, ISOLATION));
+  checkIsolated(elsewhere);
+  assert.equal(elsewhere.hash, hash);
+  checkPlain(await use(await open(page, {})));
 });
 
 test('the point material shows what it says', async () => {
@@ -150,13 +160,15 @@ test('the point material shows what it says', async () => {
     renderer.setSize(64, 64);
     const camera = new three.PerspectiveCamera(90, 1, 0.1, 10);
     camera.position.z = 2;
-    window.draw = ({ normal, color, ...options }) => {
+    window.draw = ({ normal, color, vertexColors = false, ...options }) => {
       const geometry = new three.BufferGeometry();
       geometry.setAttribute('position', new three.BufferAttribute(new Float32Array(3), 3));
       if (normal) geometry.setAttribute('normal', new three.BufferAttribute(Float32Array.from(normal), 3));
       if (color) geometry.setAttribute('color', new three.BufferAttribute(Uint8Array.from(color), 4, true));
       const scene = new three.Scene();
-      scene.add(new three.Points(geometry, createPointMaterial({ color: '#808080', ...options })));
+      const material = createPointMaterial({ color: '#808080', ...options });
+      material.vertexColors = vertexColors;
+      scene.add(new three.Points(geometry, material));
       renderer.render(scene, camera);
       const gl = renderer.getContext();
       const pixels = new Uint8Array(4 * 64 * 64);
@@ -185,7 +197,9 @@ test('the point material shows what it says', async () => {
   assert.ok(edge > 0 && edge < unknown && unknown < 128, `${edge} ${unknown}`);
   near((await draw({ normal: [0, 0, 1], shading: 'normals' })).centre, [128, 128, 255]);
   near((await draw({ normal: [0, -1, 0], shading: 'normals' })).centre, [128, 0, 128]);
-  near((await draw({ color: [200, 100, 50, 255], shading: 'colors' })).centre, [200, 100, 50]);
+  for (const vertexColors of [false, true]) {
+    near((await draw({ color: [200, 100, 50, 255], shading: 'colors', vertexColors })).centre, [200, 100, 50]);
+  }
   near((await draw({ normal: [1, 0, 0], shading: 'plain' })).centre, [128, 128, 128]);
 
   // Squares cover more than discs; 1 unit at a distance of 2 is a quarter of the height.
