@@ -1,5 +1,6 @@
 // Node's worker threads as links.
 import type { Worker } from 'node:worker_threads';
+import { BilinormalError } from './error.js';
 import type { Link } from './protocol.js';
 
 export function link(worker: Worker, receive: (message: any) => void, fail: (reason: string) => void): Link {
@@ -9,7 +10,14 @@ export function link(worker: Worker, receive: (message: any) => void, fail: (rea
   worker.on('exit', (code) => fail(`exit code ${code}`));
   worker.unref();
   return {
-    post: (message, transfer = []) => worker.postMessage(message, transfer as ArrayBuffer[]),
+    post: (message, transfer = []) => {
+      try {
+        worker.postMessage(message, transfer as ArrayBuffer[]);
+      } catch (error) {
+        // The Blobs that `fs.openAsBlob` makes cannot go to a worker.
+        throw new BilinormalError('input', `${(error as Error).message}; wanted its bytes, or the URL of the file`);
+      }
+    },
     hold: (pending) => (pending ? worker.ref() : worker.unref()),
     end: () => void worker.terminate(),
   };

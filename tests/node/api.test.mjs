@@ -1,11 +1,11 @@
 // What API.md promises, on the packed package in Node.
 import assert from 'node:assert/strict';
-import { writeFileSync } from 'node:fs';
+import { openAsBlob, writeFileSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { availableParallelism } from 'node:os';
 import { join } from 'node:path';
 import { after, test } from 'node:test';
-import { pathToFileURL } from 'node:url';
+import { fileURLToPath, pathToFileURL } from 'node:url';
 import { deviation, sameBits, sphere } from './clouds.mjs';
 import { installPacked } from './packed.mjs';
 import { parsePly, propertyOf } from './ply.mjs';
@@ -337,6 +337,7 @@ test('wrong arguments are input errors that say what came and what was wanted', 
   const positions = sphere(10);
   const locked = new Response('ply');
   locked.body.getReader();
+  const blobOfFile = await openAsBlob(fileURLToPath(import.meta.url));
   const cases = [
     [() => estimateNormals([1, 2, 3]), /positions is Array\(3\); wanted a Float32Array or Float64Array/],
     [() => estimateNormals(undefined), /positions is undefined; wanted/],
@@ -370,6 +371,7 @@ test('wrong arguments are input errors that say what came and what was wanted', 
     [() => createEstimator({ wasmUrl: 'http://[' }), /Invalid URL/],
     [() => estimateNormals(positions, { k: 5n }), /BigInt/],
     [() => readPointCloud(locked), /locked/],
+    [() => readPointCloud(blobOfFile), /wanted its bytes, or the URL of the file/],
   ];
   for (const [call, message] of cases) await assert.rejects(call, failing('input', message), `${call}`);
   await assert.rejects(
@@ -432,7 +434,9 @@ test('dispose ends pending calls and later ones, and nothing else', async () => 
   await new Promise((resolve) => setTimeout(resolve, 20));
   estimator.dispose();
   for (const call of pending) await assert.rejects(call, failing('input', /disposed/));
-  await assert.rejects(estimator.estimateNormals(sphere(10)), failing('input', /disposed/));
+  const given = sphere(10);
+  await assert.rejects(estimator.estimateNormals(given, { transfer: true }), failing('input', /disposed/));
+  assert.equal(given.length, 30, 'not taken');
   estimator.dispose();
   assert.equal((await shared).normals.length, 300);
 });
