@@ -27,6 +27,7 @@ const checks = {
       'target/threads',
       ...wasm,
     ),
+  'pages of the crate': () => run('cargo', ['doc', '--no-deps', '--quiet'], { env: { RUSTDOCFLAGS: '-D warnings' } }),
   'JavaScript, TypeScript and CSS are formatted': () =>
     run('prettier', ['--check', 'src/js', 'www', 'tests/node', 'tests/browser', 'scripts', 'benches', '!www/dist']),
   'types of the package': () => run('tsc', ['--noEmit', '--project', '.']),

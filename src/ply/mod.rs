@@ -1,6 +1,6 @@
 //! Reading and writing PLY files.
 //!
-//! [`read`] gives a cloud; [`write`] gives the file it came from, with normals; [`write_cloud`] makes a file from a
+//! [`read`] gives a cloud; [`write()`] gives the file it came from, with normals; [`write_cloud`] makes a file from a
 //! cloud alone.
 //!
 //! ```text
