@@ -27,7 +27,7 @@ pub struct Estimate {
     /// neighbourhood is the k nearest points, for [`Method::Egg`] together with the point itself.
     pub curvature: Option<Vec<f32>>,
     /// If asked for, for each point the number of its surface among those of [`Report::components`], 0 for the largest;
-    /// `u32::MAX` for an unresolved point.
+    /// `u32::MAX` for an unresolved point, and for strays too far from the others to count.
     pub components: Option<Vec<u32>>,
     /// What was done.
     pub report: Report,

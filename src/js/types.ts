@@ -72,7 +72,7 @@ export interface EstimateResult {
   curvature?: Float32Array;
   /**
    * If asked for, the surface that each point belongs to: its place among `report.components.largest`, 0 for the largest, and
-   * so on beyond the end of that list; 4294967295 for unresolved points.
+   * so on beyond the end of that list; 4294967295 for unresolved points, and for strays too far from the others to count.
    */
   components?: Uint32Array;
   report: Report;
