@@ -75,7 +75,14 @@ fn odd_clouds() -> Vec<(&'static str, Vec<f32>)> {
     for i in (0..spoilt.len()).step_by(7) {
         spoilt[i] = [nan, f32::INFINITY, f32::NEG_INFINITY][i % 3];
     }
+    // Most squares of distances are zero in single precision.
+    let mut any_size = sphere(600, 10).points;
+    for point in any_size.chunks_exact_mut(3) {
+        let size = 10f64.powf(30.0 * random.signed()) as f32;
+        point.iter_mut().for_each(|c| *c *= size);
+    }
     vec![
+        ("of any size", any_size),
         ("empty", vec![]),
         ("one point", vec![1.0, 2.0, 3.0]),
         ("two points", vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0]),

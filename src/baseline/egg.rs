@@ -37,7 +37,8 @@ pub(super) fn tangent_plane(
     sort(nearest);
     let others = nearest.iter().map(|neighbour| neighbour.place as usize).filter(|place| *place != point);
     let relative = |place: usize| places[place].position - places[point].position;
-    let radius = relative(others.clone().next_back()?).as_dvec3().length();
+    // Not that of the last one: in single precision the squares that order them may all be zero.
+    let radius = others.clone().map(|other| relative(other).as_dvec3().length()).fold(0.0, f64::max);
     // Units of about the radius are what moments are made for: the power of two below it, so that points that lie on an
     // ellipsoid stay on it when their coordinates are whole numbers.
     let scale = 1.0 / f64::from_bits(radius.to_bits() >> 52 << 52);
