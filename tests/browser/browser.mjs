@@ -148,16 +148,17 @@ export async function colorsShown(page, square) {
   return (await colorsIn(page, square)).length;
 }
 
-/** The share, 0 to 1, of a square that has the colour of back faces, which is lit. */
+/** The share, 0 to 1, of a square or another rectangle (`clip`) that has the colour of back faces, which is lit. */
 export async function backsShown(page, square) {
   const colors = await colorsIn(page, square);
   const sum = (some) => some.reduce((sum, { pixels }) => sum + pixels, 0);
   return sum(colors.filter(({ red, green, blue }) => red > 2 * green && blue > green && red > blue)) / sum(colors);
 }
 
-async function colorsIn(page, { x = 498, y = 400, side = 200 } = {}) {
+const squareAt = (x, y, side) => ({ x: x - side / 2, y: y - side / 2, width: side, height: side });
+
+async function colorsIn(page, { x = 498, y = 400, side = 200, clip = squareAt(x, y, side) } = {}) {
   await page.waitForTimeout(600);
-  const clip = { x: x - side / 2, y: y - side / 2, width: side, height: side };
   const shot = await page.screenshot({ clip });
   return page.evaluate(async (text) => {
     const image = new Image();

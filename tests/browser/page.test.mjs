@@ -420,6 +420,30 @@ test('plus enlarges the cloud, minus makes it smaller, F fits it, B shows back f
   assert.equal(await share(), before);
 });
 
+test('what is told of a cloud covers no part of it, whatever its shape', async () => {
+  const ball = [[0, 0, 0]];
+  const tower = [-4, -2, 0, 2, 4].map((y) => [0, y, 0]);
+  const plain = [-4, 0, 4].flatMap((x) => [-4, 0, 4].map((z) => [x, 0, z]));
+  for (const [width, height] of [
+    [1280, 800],
+    [900, 900],
+    [360, 740],
+  ]) {
+    for (const centres of [ball, tower, plain]) {
+      page = await browser.openPage(browser.isolated, { viewport: { width, height } });
+      await drop(page, 'balls.ply', spherePly(20_000, { centres }));
+      await result(page, 'balls.ply');
+      await page.keyboard.press('b');
+      await page.evaluate(() => document.querySelector('[data-do=flip]').click());
+      const area = await page.locator('#status').boundingBox();
+      await page.evaluate(() => (document.querySelector('#status').style.visibility = 'hidden'));
+      assert.ok((await backsShown(page, { clip: { x: 0, y: 0, width, height } })) > 0.02);
+      assert.equal(await backsShown(page, { clip: area }), 0, `${centres} in ${width} x ${height}`);
+      await page.close();
+    }
+  }
+});
+
 test('a cloud in any unit is lit, moved and picked alike', async () => {
   page = await browser.openPage(browser.isolated);
   for (const radius of [1e-19, 1e-3, 1e19]) {
@@ -523,12 +547,14 @@ test('one surface is turned by a click, or by Enter in the middle of the view', 
   const canvas = page.locator('#canvas');
   const { width, height } = await canvas.boundingBox();
   const panel = await page.locator('#panel').evaluate(({ offsetWidth }) => offsetWidth);
-  const position = { x: (width - panel) / 2 - 0.2 * height, y: height / 2 };
+  // What is wide is shown above the status line.
+  const middle = { x: (width - panel) / 2, y: (await page.locator('#status').boundingBox()).y / 2 };
+  const position = { x: middle.x - 0.2 * height, y: middle.y };
   await canvas.dblclick({ position });
   assert.doesNotMatch(await page.locator('#facts').innerText(), /by hand/);
   // Later, or it is a third click; and where the view is centred now.
   await page.waitForTimeout(600);
-  await canvas.click({ position: { x: (width - panel) / 2, y: height / 2 } });
+  await canvas.click({ position: middle });
   const turned = before.map((value, i) => (i % 12 < 3 || i % 12 > 5 ? value : 0 - value));
   assert.deepEqual(readSaved((await save(page)).bytes), turned);
   assert.match(await page.locator('#facts').innerText(), /\b1 flipped by hand/);

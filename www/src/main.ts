@@ -87,18 +87,17 @@ function start(viewer: Viewer): void {
   else session.warm();
 }
 
-/** What the status line takes when a scan is shown, in pixels, with the facts of most scans: its height on a small screen. */
-const STATUS_HEIGHT = 150;
-/** And its width on a window that has so much to spare. */
-const STATUS_WIDTH = 170;
-const WIDE = 1000;
+/** What the status line takes with the facts of most scans, in pixels: in its corner, and on a small screen. */
+const STATUS = { width: 396, height: 200 };
+const SMALL_STATUS_HEIGHT = 185;
 
 /** What the panel and the status line cover: the right edge and a corner, or on a small screen top and bottom. */
-function marginsOf(small: MediaQueryList): Margins {
+function marginsOf(small: MediaQueryList): Margins[] {
   const { offsetWidth: width, offsetTop: gap } = element('#panel');
   const title = element('#panel > summary').offsetHeight;
-  if (small.matches) return { top: title + gap, right: 0, bottom: STATUS_HEIGHT, left: 0 };
-  return { top: 0, right: width + gap, bottom: 0, left: innerWidth > WIDE ? STATUS_WIDTH : 0 };
+  if (small.matches) return [{ top: title + gap, right: 0, bottom: SMALL_STATUS_HEIGHT, left: 0 }];
+  const beside = { top: 0, right: width + gap, bottom: 0, left: STATUS.width };
+  return [beside, { ...beside, bottom: STATUS.height, left: 0 }];
 }
 
 /** Files dropped anywhere on the window. */

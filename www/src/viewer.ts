@@ -46,10 +46,11 @@ export interface Viewer {
   pick(at?: { x: number; y: number }): number;
   /** Where the camera is, in the coordinates of the cloud's positions. */
   eye(): [number, number, number];
-  /** Pixels at the edges that are covered: the cloud is framed in the rest. */
-  setMargins(margins: Margins): void;
+  /** What is covered, at least one choice: from then on the cloud is framed in the rest, where that makes it largest. */
+  setMargins(choices: Margins[]): void;
 }
 
+/** Pixels at the edges. */
 export interface Margins {
   top: number;
   right: number;
@@ -108,6 +109,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   let shading: Shading = 'shaded';
   let pointSize = 1;
   let margins: Margins = { top: 0, right: 0, bottom: 0, left: 0 };
+  let choices = [margins];
 
   let frame = 0;
   let lastFrame = 0;
@@ -202,7 +204,12 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     const box = new Vector3(x, y, z).applyEuler(turned.rotation);
     const flat = 1 - Math.min(1, Math.abs(box.y) / Math.max(Math.abs(box.x), Math.abs(box.z), Number.MIN_VALUE));
     const direction = new Vector3(0.5, 0.36 + 0.45 * flat, 1).normalize();
-    const distance = 1.06 * framingDistance(direction, box.multiplyScalar(0.5 / bounds.radius));
+    const half = box.multiplyScalar(0.5 / bounds.radius);
+    const distances = choices.map((choice) => framingDistance(direction, half, choice));
+    const least = Math.min(...distances);
+    margins = choices[distances.indexOf(least)]!;
+    resize();
+    const distance = 1.06 * least;
     controls.target.set(0, 0, 0);
     camera.position.copy(direction).multiplyScalar(distance);
     controls.minDistance = 1e-3;
@@ -213,12 +220,12 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     request();
   }
 
-  /** How far away, looking along `direction`, the box (half edges) or the unit ball just fills the free window. */
-  function framingDistance(direction: Vector3, half: Vector3): number {
+  /** How far away, looking along `direction`, the box (half edges) or the unit ball just fills what is not covered. */
+  function framingDistance(direction: Vector3, half: Vector3, { top, right: end, bottom, left }: Margins): number {
     const { clientWidth: width, clientHeight: height } = canvas;
     const slope = Math.tan((camera.fov * Math.PI) / 360) / height;
-    const across = slope * Math.max(width - margins.left - margins.right, width / 4);
-    const upright = slope * Math.max(height - margins.top - margins.bottom, height / 4);
+    const across = slope * Math.max(width - left - end, width / 4);
+    const upright = slope * Math.max(height - top - bottom, height / 4);
     const right = new Vector3(0, 1, 0).cross(direction).normalize();
     const above = new Vector3().crossVectors(direction, right);
     let distance = 0;
@@ -352,7 +359,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       return points.worldToLocal(camera.position.clone()).toArray();
     },
     setMargins(next) {
-      margins = next;
+      choices = next;
+      margins = next[0]!;
       resize();
     },
   };
