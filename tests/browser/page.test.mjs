@@ -69,7 +69,7 @@ test('a dropped scan gets its normals by threads and is shaded', async () => {
   // Of the smallest cubes, if there is more than one size.
   const edge = shown.to ?? shown.edge;
   assert.ok(shown.cubes > 1_000 && edge > 0 && shown.noise < 0.01 * edge, JSON.stringify(shown));
-  assert.equal(shown.unresolved, 0);
+  assert.equal(shown.without, 0);
   assert.ok(shown.phases.length > 2 && shown.phases.includes('reading the file'), String(shown.phases));
 
   const shaded = await colorsShown(page, { side: 300 });
@@ -176,8 +176,8 @@ test('a bad file gives a message that can be read, and the cloud before stays', 
 test('a file of one point ends too, without a normal', async () => {
   page = await browser.openPage(browser.isolated);
   await drop(page, 'one.ply', spherePly(1));
-  const { headline, error, unresolved, cube } = await result(page, 'one.ply');
-  assert.deepEqual({ error, unresolved, cube }, { error: undefined, unresolved: 1, cube: 1 });
+  const { headline, error, without, cube } = await result(page, 'one.ply');
+  assert.deepEqual({ error, without, cube }, { error: undefined, without: 1, cube: 1 });
   assert.match(headline, /for 1 point: no normal was found$/);
 });
 
@@ -191,7 +191,7 @@ test('points that are not finite and a stray one neither blank the view nor shri
   await drop(page, 'stray.ply', file);
   const shown = await result(page, 'stray.ply');
   assert.equal(shown.error, undefined);
-  assert.ok(shown.unresolved >= 2, `${shown.unresolved} unresolved`);
+  assert.ok(shown.without >= 2, `${shown.without} without a normal`);
   assert.match(await page.locator('#facts').innerText(), /99\.9% in the largest/);
   await page.getByRole('radio', { name: 'Normals' }).check();
   const colors = await colorsShown(page, { side: 300 });
@@ -256,9 +256,9 @@ test('another method, after a k that cannot be one', async () => {
   await field.fill('30');
   await again.click();
   await page.waitForFunction(() => document.querySelector('#facts').textContent.includes('k = 30'));
-  const { phases, unresolved } = await result(page, 'ball.ply');
-  assert.ok(phases.includes('tree') && phases.includes('normals'), String(phases));
-  assert.equal(unresolved, 0);
+  const { phases, without } = await result(page, 'ball.ply');
+  assert.ok(phases.includes('search tree') && phases.includes('normals'), String(phases));
+  assert.equal(without, 0);
   await page.screenshot({ path: join(ARTEFACTS, 'method.png') });
 
   // Back to cubes: what the report of the other method knows nothing of begins anew.
@@ -356,7 +356,7 @@ test('normals are saved with the signs of the orientation that was chosen', asyn
     ['Z', 2, 1],
   ]) {
     await page.getByRole('radio', { name: up, exact: true }).check();
-    const { facts, saved } = await oriented('Up');
+    const { facts, saved } = await oriented('Upwards');
     assert.equal(shareOf(saved, rising(axis, sign)), 1, up);
     assert.match(facts, new RegExp(`upwards\\s+along ${up}`));
     assert.doesNotMatch(facts, /surface/);
@@ -402,12 +402,12 @@ test('plus enlarges the cloud, minus makes it smaller, F fits it, B shows back f
   await page.keyboard.press('b');
   await drop(page, 'ball.ply', spherePly(20_000));
   await result(page, 'ball.ply');
-  // A ball that has only back faces is told from the background by their colour.
-  await page.getByRole('button', { name: 'Flip all' }).click();
   const backs = page.getByRole('checkbox', { name: 'Back faces' });
   assert.ok(!(await backs.isChecked()), 'before there was a scan');
   await page.keyboard.press('Shift+B');
   assert.ok(await backs.isChecked());
+  // A ball that has only back faces is told from the background by their colour.
+  await page.getByRole('button', { name: 'Flip all' }).click();
   const share = () => backsShown(page, { side: 780 });
   const before = await share();
   await page.locator('#canvas').focus();
@@ -420,6 +420,72 @@ test('plus enlarges the cloud, minus makes it smaller, F fits it, B shows back f
   assert.equal(await share(), before);
 });
 
+test('the view follows the window until it is moved', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'ball.ply', spherePly(20_000));
+  await result(page, 'ball.ply');
+  await page.getByRole('button', { name: 'Flip all' }).click();
+  await page.setViewportSize({ width: 390, height: 844 });
+  const ball = () => backsShown(page, { clip: { x: 0, y: 0, width: 390, height: 844 } });
+  const side = () => backsShown(page, { clip: { x: 0, y: 0, width: 4, height: 844 } });
+  const before = await ball();
+  assert.ok(before > 0.1 && (await side()) === 0, 'the whole ball fits again');
+  await page.locator('#canvas').focus();
+  for (let presses = 1; presses <= 5; presses++) await page.keyboard.press('+');
+  const larger = await ball();
+  assert.ok(larger > 1.5 * before);
+  await page.setViewportSize({ width: 400, height: 844 });
+  assert.ok(Math.abs((await ball()) / larger - 1) < 0.1, 'as it was moved');
+});
+
+test('settings that were not computed with are told from those that were', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'ball.ply', spherePly(5_000));
+  await result(page, 'ball.ply');
+  const note = page.getByText('is of other settings');
+  assert.ok(await note.isHidden());
+  await page.getByRole('radio', { name: 'k nearest' }).check();
+  assert.ok(await note.isVisible());
+  await page.getByRole('radio', { name: 'Bilinear' }).check();
+  assert.ok(await note.isHidden());
+  await page.getByRole('radio', { name: 'Upwards' }).check();
+  assert.ok(await note.isVisible());
+  await page.getByRole('button', { name: 'Re-run' }).click();
+  await page.waitForFunction(() => document.querySelector('#facts').textContent.includes('upwards'));
+  assert.ok(await note.isHidden());
+  // The axis now decides; the shading does not.
+  await page.getByRole('radio', { name: 'Normals' }).check();
+  assert.ok(await note.isHidden());
+  await page.getByRole('radio', { name: 'Z', exact: true }).check();
+  assert.ok(await note.isVisible());
+});
+
+test('the focus of the keyboard goes where the work goes', async () => {
+  page = await browser.openPage(browser.isolated);
+  const focused = () => page.evaluate(() => document.activeElement.dataset.do ?? document.activeElement.id);
+  await page.getByRole('button', { name: 'Try the sample' }).press('Enter');
+  await page.getByRole('button', { name: 'Cancel' }).waitFor();
+  assert.equal(await focused(), 'cancel');
+  await result(page, 'sample.ply');
+  assert.equal(await focused(), 'canvas');
+  await drop(page, 'bad.ply', Buffer.from('ply\nformat'));
+  await page.getByRole('button', { name: 'Dismiss the message' }).press('Enter');
+  assert.equal(await focused(), 'canvas');
+  assert.ok(await page.locator('#error').isHidden());
+});
+
+test('a file without a finite point is refused', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'ball.ply', spherePly(5_000));
+  await result(page, 'ball.ply');
+  await drop(page, 'nan.ply', spherePly(50, { radius: NaN }));
+  await page.locator('#error').waitFor();
+  assert.match(await page.locator('#error p').textContent(), /nan\.ply: no point .* finite/);
+  assert.equal(await page.locator('#name').textContent(), 'ball.ply');
+  await page.keyboard.press('Escape');
+  assert.ok(await page.locator('#error').isHidden());
+});
+
 test('what is told of a cloud covers no part of it, whatever its shape', async () => {
   const ball = [[0, 0, 0]];
   const tower = [-4, -2, 0, 2, 4].map((y) => [0, y, 0]);
@@ -428,12 +494,12 @@ test('what is told of a cloud covers no part of it, whatever its shape', async (
     [1280, 800],
     [900, 900],
     [360, 740],
+    [844, 390],
   ]) {
     for (const centres of [ball, tower, plain]) {
       page = await browser.openPage(browser.isolated, { viewport: { width, height } });
       await drop(page, 'balls.ply', spherePly(20_000, { centres }));
       await result(page, 'balls.ply');
-      await page.keyboard.press('b');
       await page.evaluate(() => document.querySelector('[data-do=flip]').click());
       const area = await page.locator('#status').boundingBox();
       await page.evaluate(() => (document.querySelector('#status').style.visibility = 'hidden'));
@@ -509,6 +575,7 @@ test('a flip turns what is saved, again undoes it, and curvature keeps it', asyn
   assert.match(await page.locator('#facts').innerText(), /inwards/);
   const turned = before.map((value, i) => (i % 6 < 3 ? value : 0 - value));
   assert.deepEqual(readSaved((await save(page)).bytes), turned);
+  assert.ok((await backsShown(page)) > 0.9, 'a flip can be seen');
 
   // Shown with the signs that are on the screen, though it is all computed again.
   await page.getByRole('radio', { name: 'Curvature' }).check();
@@ -542,6 +609,8 @@ test('one surface is turned by a click, or by Enter in the middle of the view', 
   assert.match(facts, /\b2 surfaces/);
   await turn.click();
   assert.equal(await turn.getAttribute('aria-pressed'), 'true');
+  const hint = page.getByText('Click or tap a surface to flip it');
+  assert.ok(await hint.isVisible());
 
   // A double click centres the view on a point of the left one, and turns nothing; a click there does.
   const canvas = page.locator('#canvas');
@@ -574,6 +643,7 @@ test('one surface is turned by a click, or by Enter in the middle of the view', 
   await canvas.dragTo(canvas, { sourcePosition: position, targetPosition: { x: position.x + 40, y: position.y } });
   await page.keyboard.press('Escape');
   assert.equal(await turn.getAttribute('aria-pressed'), 'false');
+  assert.ok(await hint.isHidden());
   await canvas.click({ position });
   assert.doesNotMatch(await page.locator('#facts').innerText(), /by hand/);
 });

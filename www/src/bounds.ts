@@ -18,8 +18,8 @@ const SAMPLE = 60_000;
 /** Share of the points that may lie outside of the bulk, at each end of each axis. */
 const STRAY = 0.005;
 
-/** The bounds of `positions` (x0 y0 z0 x1 ...). A cloud without a finite point has centre and extents 0, radii 1. */
-export function boundsOf(positions: Float32Array): Bounds {
+/** The bounds of `positions` (x0 y0 z0 x1 ...), if there is a finite point. */
+export function boundsOf(positions: Float32Array): Bounds | undefined {
   const points = positions.length / 3;
   const step = Math.max(1, Math.floor(points / SAMPLE));
   const values = [0, 1, 2].map((axis) => {
@@ -40,7 +40,7 @@ export function boundsOf(positions: Float32Array): Bounds {
   const centre = low.map((value, axis) => (value + high[axis]!) / 2) as Bounds['centre'];
   const extent = low.map((value, axis) => high[axis]! - value) as Bounds['extent'];
 
-  let squaredReach = 0;
+  let squaredReach = -1;
   const squares = new Float64Array(Math.ceil(points / step));
   let sampled = 0;
   for (let i = 0; i < points; i++) {
@@ -52,6 +52,7 @@ export function boundsOf(positions: Float32Array): Bounds {
     if (square > squaredReach) squaredReach = square;
     if (i % step === 0) squares[sampled++] = square;
   }
+  if (squaredReach < 0) return undefined;
   const bulk = squares.subarray(0, sampled).sort();
   const most = sampled === 0 ? 0 : Math.sqrt(bulk[Math.floor((1 - 2 * STRAY) * (sampled - 1))]!);
   const reach = Math.sqrt(squaredReach) || 1;

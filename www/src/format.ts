@@ -26,5 +26,17 @@ export function percent(part: number, whole: number): string {
   return `${measure(part < whole ? Math.min(share, 99.9) : share)}%`;
 }
 
-/** A phase as the report names it, in words: "cellSize" is "cell size". */
-export const phaseName = (phase: string) => phase.replace(/[A-Z]/g, (letter) => ` ${letter.toLowerCase()}`);
+const PHASES: Record<string, string> = {
+  start: 'starting',
+  load: 'loading the program',
+  read: 'reading the points',
+  write: 'writing the points',
+  cellSize: 'size of the cubes',
+  sort: 'sorting into cubes',
+  vote: 'smooth places',
+  detail: 'edges and details',
+  tree: 'search tree',
+};
+
+/** A phase, as the report and the progress name it, in words. */
+export const phaseName = (phase: string) => PHASES[phase] ?? phase;

@@ -1,4 +1,5 @@
 // Puts the page together: what a person does goes to the session and the state, what the state says goes to the view.
+import { measure } from './format';
 import { drawHero } from './hero';
 import { element, showState } from './panel';
 import { createSession, type Session } from './session';
@@ -27,14 +28,23 @@ store.set({ unsupported, ready: viewer !== undefined });
 function start(viewer: Viewer): void {
   const session = createSession(store, viewer);
   const input = element<HTMLInputElement>('#file');
+  const panel = element<HTMLDetailsElement>('#panel');
   const small = matchMedia('(max-width: 640px)');
+  const low = matchMedia('(max-height: 520px)');
+  const makeRoom = () => viewer.setMargins(marginsOf(small.matches, low.matches));
+  const turnSurfaces = (turning: boolean) => {
+    // Both sides look the same without, and on a small screen the panel hides the cloud.
+    store.set(turning ? { turning, backs: true } : { turning });
+    if (turning && small.matches) panel.open = false;
+  };
 
   const actions: Record<string, () => void> = {
     choose: () => input.click(),
     sample: () => void session.openSample(),
     fit: () => viewer.fit(),
     flip: () => session.flip(),
-    turn: () => store.set({ turning: !store.state.turning }),
+    turn: () => turnSurfaces(!store.state.turning),
+    done: () => turnSurfaces(false),
     save: () => {
       if (!store.state.job) void session.save();
     },
@@ -53,7 +63,7 @@ function start(viewer: Viewer): void {
   addEventListener('keydown', (event) => {
     if (event.key === 'Escape') {
       if (store.state.job) session.cancel();
-      else store.set({ turning: false });
+      else store.set({ turning: false, error: undefined });
     }
     const typing = event.target instanceof HTMLInputElement && event.target.type === 'text';
     if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -72,32 +82,38 @@ function start(viewer: Viewer): void {
   takeTurns(session, viewer);
 
   // On a small screen the panel would hide the cloud: it starts closed there.
-  element<HTMLDetailsElement>('#panel').open = !small.matches;
-  small.addEventListener('change', () => viewer.setMargins(marginsOf(small)));
+  panel.open = !small.matches;
+  small.addEventListener('change', () => {
+    panel.open = !small.matches;
+    makeRoom();
+  });
+  low.addEventListener('change', makeRoom);
   let named: string | undefined;
   store.listen(({ scan }) => {
     if (scan?.name === named) return;
     named = scan?.name;
     // The panel takes its place with the first scan, and the view makes room for it.
-    viewer.setMargins(marginsOf(small));
-    viewer.fit();
+    makeRoom();
   });
 
   if (new URLSearchParams(location.search).has('sample')) void session.openSample();
   else session.warm();
 }
 
-/** What the status line takes with the facts of most scans, in pixels: in its corner, and on a small screen. */
-const STATUS = { width: 396, height: 200 };
-const SMALL_STATUS_HEIGHT = 185;
+/** What the status line takes, in pixels, with the facts of most scans; a low window does without these. */
+const STATUS = { width: 396, height: 200, low: 120 };
 
 /** What the panel and the status line cover: the right edge and a corner, or on a small screen top and bottom. */
-function marginsOf(small: MediaQueryList): Margins[] {
+function marginsOf(small: boolean, low: boolean): Margins[] {
   const { offsetWidth: width, offsetTop: gap } = element('#panel');
   const title = element('#panel > summary').offsetHeight;
-  if (small.matches) return [{ top: title + gap, right: 0, bottom: SMALL_STATUS_HEIGHT, left: 0 }];
-  const beside = { top: 0, right: width + gap, bottom: 0, left: STATUS.width };
-  return [beside, { ...beside, bottom: STATUS.height, left: 0 }];
+  const bottom = low ? STATUS.low : STATUS.height;
+  if (small) return [{ top: title + gap, right: 0, bottom, left: 0 }];
+  const right = width + gap;
+  return [
+    { top: 0, right, bottom: 0, left: STATUS.width },
+    { top: 0, right, bottom, left: 0 },
+  ];
 }
 
 /** Files dropped anywhere on the window. */
@@ -176,7 +192,11 @@ function takeControls(session: Session, viewer: Viewer): void {
   const backs = element<HTMLInputElement>('#backs');
   backs.addEventListener('change', () => store.set({ backs: backs.checked }));
   const size = element<HTMLInputElement>('#point-size');
-  size.addEventListener('input', () => store.set({ pointSize: 2 ** size.valueAsNumber }));
+  size.addEventListener('input', () => {
+    const pointSize = 2 ** size.valueAsNumber;
+    size.setAttribute('aria-valuetext', `${measure(pointSize)} times`);
+    store.set({ pointSize });
+  });
   const cell = element<HTMLInputElement>('#cell-value');
   cell.addEventListener('input', () => store.set({ cellText: cell.value }));
   const k = element<HTMLInputElement>('#k-value');

@@ -65,5 +65,9 @@ export function orientOf(kind: OrientKind, up: Up, eye: Place, scanner: Place | 
   return kind;
 }
 
+/** What of the form, and of the axis, changes the normals: the same text for what gives the same. */
+export const askedBy = (form: OptionsForm, up: Up): string =>
+  JSON.stringify([parseOptions(form), form.orientKind, form.orientKind === 'up' ? up : '']);
+
 /** Whether the normals were given one sign for each surface. */
 export const hasSurfaces = (orient: Orient | undefined) => orient === 'consistent' || orient === 'outward';

@@ -1,7 +1,7 @@
 // Draws the state into the document. Nothing is remembered here: every part is a function of the state.
 import type { Report } from 'bilinormal';
 import { count, duration, measure, percent, phaseName, plural } from './format';
-import { METHODS, hasSurfaces, parseOptions } from './options';
+import { METHODS, askedBy, hasSurfaces, parseOptions } from './options';
 import type { State, Store } from './state';
 
 export function element<T extends HTMLElement>(selector: string): T {
@@ -13,19 +13,22 @@ export function element<T extends HTMLElement>(selector: string): T {
 const make = (tag: string, text: string, className = '') =>
   Object.assign(document.createElement(tag), { textContent: text, className });
 
-function fact(value: string, name: string): HTMLElement {
+/** `about` is told to those who point at it. */
+function fact(value: string, name: string, about = ''): HTMLElement {
   const item = make('li', ` ${name}`);
   item.prepend(make('b', value));
+  item.title = about;
   return item;
 }
 
-const counted = (value: number, noun: string) => fact(count(value), plural(value, noun));
+const counted = (value: number, noun: string, about = '') => fact(count(value), plural(value, noun), about);
 
 export function showState(store: Store): void {
   const start = element('#start');
   const canvas = element('#canvas');
   const panel = element<HTMLDetailsElement>('#panel');
   const unsupported = element('#unsupported');
+  const title = document.title;
   let drawn: State | undefined;
 
   store.listen((state) => {
@@ -33,6 +36,7 @@ export function showState(store: Store): void {
     drawn = state;
     const { scan, report, job, error } = state;
     const busy = job !== undefined;
+    const focused = document.activeElement;
 
     start.hidden = busy || scan !== undefined;
     panel.hidden = scan === undefined;
@@ -45,7 +49,9 @@ export function showState(store: Store): void {
     }
 
     element('#lost').hidden = !state.lost;
-    element('#name').textContent = scan?.name ?? 'bilinormal';
+    const name = element('#name');
+    name.textContent = name.title = scan?.name ?? 'bilinormal';
+    document.title = scan ? `${scan.name}, bilinormal` : title;
     check('shading', state.shading);
     check('up', state.up);
     radio('shading', 'colors').disabled = !scan?.hasColors;
@@ -62,10 +68,13 @@ export function showState(store: Store): void {
     const turn = element<HTMLButtonElement>('[data-do=turn]');
     turn.disabled = !hasSurfaces(state.used?.orient) || busy;
     turn.setAttribute('aria-pressed', String(state.turning));
-    document.documentElement.classList.toggle('turning', state.turning && !turn.disabled);
+    const turning = state.turning && !turn.disabled;
+    document.documentElement.classList.toggle('turning', turning);
+    element('#hint').hidden = !turning;
     const save = element<HTMLButtonElement>('[data-do=save]');
     save.disabled = !scan?.hasNormals;
     rest(save, busy);
+    tell(before?.job, job);
 
     showOptions(state, busy);
     showError(error);
@@ -76,7 +85,19 @@ export function showState(store: Store): void {
       before?.flipped === state.flipped &&
       before?.turnedSurfaces === state.turnedSurfaces;
     if (!told) showResult(state);
+    if (focused?.closest('[hidden]')) moveFocus(state);
   });
+}
+
+/** What had the focus of the keyboard is gone. */
+function moveFocus({ scan, job }: State): void {
+  const next = job ? '[data-do=cancel]' : scan ? '#canvas' : '#start [data-do=choose]';
+  element(next).focus();
+}
+
+/** For those who hear the page: what begins. */
+function tell(before: State['job'], job: State['job']): void {
+  if (before?.title !== job?.title) element('#told').textContent = job?.title ?? '';
 }
 
 /** What starts a job does nothing while one runs, but keeps the focus of the keyboard. */
@@ -117,6 +138,10 @@ function showOptions(state: State, busy: boolean): void {
   again.disabled = problem !== '';
   rest(again, busy);
   again.textContent = scan?.hasNormals ? 'Re-run' : 'Compute';
+  const pending = !busy && state.used !== undefined && state.used.asked !== askedBy(state, state.up);
+  element('#pending').hidden = !pending || problem !== '';
+  again.classList.toggle('primary', pending);
+  element('[data-do=save]').classList.toggle('primary', !pending);
 }
 
 function showError(error: string | undefined): void {
@@ -141,10 +166,15 @@ function factsOf(report: Report, used: State['used']): HTMLElement[] {
   if (report.noise !== undefined) {
     // Without a surface no size was chosen.
     const edges = (report.scales ?? []).map(({ cellSize }) => measure(cellSize));
+    const range = [...new Set([edges[0]!, edges.at(-1)!])].join(' to ');
     return [
-      counted(report.cells, 'cube'),
-      ...(edges.length ? [fact([...new Set([edges[0]!, edges.at(-1)!])].join(' to '), 'edge')] : []),
-      fact(measure(report.noise), 'noise'),
+      counted(report.cells, 'cube', 'Those that hold points, in the smallest sizes that were needed'),
+      ...(edges.length ? [fact(range, 'edge', 'Of the cubes that were chosen, in the unit of the file')] : []),
+      fact(
+        measure(report.noise),
+        'noise',
+        'Distance from the surface, in the unit of the file: half of the points are nearer',
+      ),
     ];
   }
   return [
@@ -154,12 +184,20 @@ function factsOf(report: Report, used: State['used']): HTMLElement[] {
   ];
 }
 
+type Largest = NonNullable<Report['components']>['largest'][number];
+
 /** Where the normals of a surface point to, and where they do once they are flipped. */
 const WAYS = {
   air: ['outwards', 'inwards'],
   volume: ['away from the middle', 'towards the middle'],
-  convention: ['to either side', 'to either side'],
 } as const;
+
+function facing({ side, confidence }: Largest, isTurned: boolean): HTMLElement {
+  if (side === 'convention') return fact('no outside', 'found for it');
+  const [way, opposite] = WAYS[side];
+  const about = 'Which way the largest surface faces, and how sure that is, from 0 to 1';
+  return fact(isTurned ? opposite : way, `with confidence ${confidence.toFixed(2)}`, about);
+}
 
 /** How the signs were chosen: for surfaces, the largest one and which way it faces. */
 function signsOf({ components, points }: Report, { scan, used, flipped, turnedSurfaces }: State): HTMLElement[] {
@@ -167,13 +205,11 @@ function signsOf({ components, points }: Report, { scan, used, flipped, turnedSu
     const [largest] = components.largest;
     const facts = [counted(components.count, 'surface')];
     if (!largest) return facts;
-    const { side, confidence } = largest;
-    const [way, opposite] = WAYS[side];
     const turned = turnedSurfaces.size;
     return [
       ...facts,
       fact(percent(largest.points, points), 'in the largest'),
-      fact(flipped === turnedSurfaces.has(0) ? way : opposite, `with confidence ${confidence.toFixed(2)}`),
+      facing(largest, flipped !== turnedSurfaces.has(0)),
       ...(turned ? [fact(count(turned), 'flipped by hand')] : []),
     ];
   }
@@ -193,7 +229,8 @@ function showResult(state: State): void {
   if (!scan) return;
   element('#total').textContent = report ? duration(report.milliseconds.total) : count(scan.points);
   const points = plural(scan.points, 'point');
-  const none = report?.unresolved === scan.points ? ': no normal was found' : '';
+  const remedy = report && report.cellSize > 0 && report.noise === undefined ? ', try the cell Auto' : '';
+  const none = report?.unresolved === scan.points ? `: no normal was found${remedy}` : '';
   const label = report ? `for ${count(scan.points)} ${points}${none}` : `${points}, without normals`;
   element('#total-label').textContent = label;
 
@@ -208,8 +245,9 @@ function showResult(state: State): void {
   facts.append(
     ...factsOf(report, used),
     ...signsOf(report, state),
-    fact(count(report.unresolved), 'unresolved'),
+    fact(count(report.unresolved), 'without a normal'),
     counted(report.threads, 'thread'),
+    ...(scan.hadNormals ? [fact('new normals', 'instead of those of the file')] : []),
   );
   facts.dataset['mode'] = report.mode;
 

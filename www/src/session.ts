@@ -3,7 +3,7 @@
 import { estimateNormals, readPointCloud, writePly, type EstimateOptions } from 'bilinormal';
 import { scannerOf } from '../../src/js/scanner';
 import { boundsOf, guessUp } from './bounds';
-import { METHODS, hasSurfaces, orientOf, parseOptions } from './options';
+import { METHODS, askedBy, hasSurfaces, orientOf, parseOptions } from './options';
 import { colorsOf } from './ramp';
 import { UNTURNED, type Store, type Turned } from './state';
 import type { Viewer } from './viewer';
@@ -86,6 +86,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
     if (cloud.count === 0) throw new Error('the file holds no points');
     const readMilliseconds = performance.now() - started;
     const bounds = boundsOf(cloud.positions);
+    if (!bounds) throw new Error('no point of the file has finite coordinates');
     const up = guessUp(bounds, cloud.origin);
     const hasColors = cloud.colors !== undefined;
     const shading = store.state.shading === 'colors' && !hasColors ? 'shaded' : store.state.shading;
@@ -99,6 +100,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
       hasCurvature: false,
       scanner: scannerOf(cloud),
       readMilliseconds,
+      hadNormals: cloud.normals !== undefined,
     };
     const { orientKind } = store.state;
     // An edge length belongs to the unit of the file before.
@@ -121,11 +123,11 @@ export function createSession(store: Store, viewer: Viewer): Session {
     if ('problem' in parsed) throw new Error(parsed.problem);
     const { orientKind, up, scan } = store.state;
     const orient = orientOf(orientKind, up, viewer.eye(), scan?.scanner);
-    await shadeBy({ ...parsed.options, orient }, UNTURNED, step);
+    await shadeBy({ ...parsed.options, orient }, askedBy(store.state, up), UNTURNED, step);
   }
 
-  /** `turned` is what a person turned by hand since it was computed last. */
-  async function shadeBy(options: EstimateOptions, turned: Turned, step: Step): Promise<void> {
+  /** `asked` is what the form asked for, `turned` what a person turned by hand since it was computed last. */
+  async function shadeBy(options: EstimateOptions, asked: string, turned: Turned, step: Step): Promise<void> {
     const { scan, shading } = store.state;
     if (!shown || !scan) return;
     const { method = 'bilinear', k = 0, orient = 'none' } = options;
@@ -145,7 +147,8 @@ export function createSession(store: Store, viewer: Viewer): Session {
     shown = { ...shown, result, options };
     viewer.setNormals(result.normals, result.curvature && colorsOf(result.curvature));
     const hasCurvature = result.curvature !== undefined;
-    store.set({ scan: { ...scan, hasNormals: true, hasCurvature }, report, used: { method, k, orient }, ...turned });
+    const used = { method, k, orient, asked };
+    store.set({ scan: { ...scan, hasNormals: true, hasCurvature }, report, used, ...turned });
   }
 
   return {
@@ -174,16 +177,17 @@ export function createSession(store: Store, viewer: Viewer): Session {
 
     async addCurvature() {
       const { result, options } = shown ?? {};
-      if (!result || !options || result.curvature) return;
-      const { flipped, turnedSurfaces } = store.state;
-      await run('Computing curvature', (step) => shadeBy(options, { flipped, turnedSurfaces }, step));
+      const { flipped, turnedSurfaces, used } = store.state;
+      if (!result || !options || !used || result.curvature) return;
+      await run('Computing curvature', (step) => shadeBy(options, used.asked, { flipped, turnedSurfaces }, step));
     },
 
     flip() {
       if (!shown?.result) return;
       negate(shown.result.normals);
       viewer.refreshNormals();
-      store.set({ flipped: !store.state.flipped });
+      // Both sides look the same without.
+      store.set({ flipped: !store.state.flipped, backs: true });
     },
 
     flipSurface(point) {

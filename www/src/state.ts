@@ -14,6 +14,8 @@ export interface Scan {
   /** Where it was scanned from, if the file says so. */
   scanner: [number, number, number] | undefined;
   readMilliseconds: number;
+  /** Whether the file brought normals, which are not the ones that are shown. */
+  hadNormals: boolean;
 }
 
 /** The work under way. `fraction` is undefined where the work cannot tell how far it is. */
@@ -42,8 +44,8 @@ export interface State extends OptionsForm, Turned {
   lost: boolean;
   scan: Scan | undefined;
   report: Report | undefined;
-  /** What the report is about. */
-  used: { method: Method; k: number; orient: Orient } | undefined;
+  /** What the report is about, and what the form asked for then. */
+  used: { method: Method; k: number; orient: Orient; asked: string } | undefined;
   job: Job | undefined;
   error: string | undefined;
   shading: Shading;

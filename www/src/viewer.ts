@@ -110,6 +110,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   let pointSize = 1;
   let margins: Margins = { top: 0, right: 0, bottom: 0, left: 0 };
   let choices = [margins];
+  /** Whether the view is still as `fit` left it: then it follows the window. */
+  let framed = false;
 
   let frame = 0;
   let lastFrame = 0;
@@ -208,7 +210,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     const distances = choices.map((choice) => framingDistance(direction, half, choice));
     const least = Math.min(...distances);
     margins = choices[distances.indexOf(least)]!;
-    resize();
+    makeRoom();
     const distance = 1.06 * least;
     controls.target.set(0, 0, 0);
     camera.position.copy(direction).multiplyScalar(distance);
@@ -217,6 +219,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     controls.update();
     // A jump, not a movement: draw all of it at once.
     lastMove = -Infinity;
+    framed = true;
     request();
   }
 
@@ -243,7 +246,13 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     renderer.setSize(width, height, false);
     camera.aspect = width / height;
-    // The middle of what is not covered is the middle of the view.
+    if (framed) fit();
+    else makeRoom();
+  }
+
+  /** The middle of what is not covered is the middle of the view. */
+  function makeRoom(): void {
+    const { clientWidth: width, clientHeight: height } = canvas;
     const { top, right, bottom, left } = margins;
     camera.setViewOffset(width, height, (right - left) / 2, (bottom - top) / 2, width, height);
     request();
@@ -282,11 +291,14 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   }
 
   controls.addEventListener('change', () => {
+    framed = false;
     lastMove = performance.now();
     request();
   });
   canvas.addEventListener('dblclick', focus);
   canvas.addEventListener('keydown', (event) => {
+    // These zoom the page.
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
     // Against its documentation, dollyIn multiplies the distance.
     if (event.key === '+' || event.key === '=') controls.dollyIn(1 / 1.1);
     if (event.key === '-') controls.dollyOut(1 / 1.1);
@@ -350,7 +362,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     },
     setUp(up) {
       turned.rotation.x = { y: 0, z: -Math.PI / 2, '-y': Math.PI }[up];
-      request();
+      if (framed) fit();
+      else request();
     },
     fit,
     pick,
@@ -361,7 +374,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     setMargins(next) {
       choices = next;
       margins = next[0]!;
-      resize();
+      if (framed) fit();
+      else makeRoom();
     },
   };
   return viewer;
