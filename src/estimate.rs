@@ -81,7 +81,7 @@ pub struct Scale {
 /// [`Method::Bilinear`] is linear in the number of points. Beyond the input it takes about 30 bytes a point with cubes that
 /// hold 4 points or more, up to some 130 when every point has a cube for itself; with [`Cell::Auto`] about 40, up to 70
 /// where no surface is smooth. The baselines take n log n time and 30 bytes a point. Signs by [`Orient::Consistent`] and
-/// [`Orient::Outward`] take 32 bytes a point after all that is given back, up to 190 where there is no surface.
+/// [`Orient::Outward`] take 27 bytes a point after all that is given back, up to 190 where there is no surface.
 ///
 /// # Errors
 /// [`Error::Input`] and [`Error::Unsupported`] for the options, [`Error::Limit`] when memory does not suffice,

@@ -24,10 +24,10 @@ is kept, existing normals are replaced. IN may be - for standard input.
       --orient HOW       none (default), consistent, outward, viewpoint=x,y,z, up=x,y,z, or scanner: towards where the
                          file says that it stood
       --curvature        add the surface variation as the property curvature
-      --threads N        default: one for each processor
+      --threads N        1 to 256, default: one for each processor up to 16
       --ascii            write text instead of little-endian binary
       --json             print the report as one line of JSON
-      --quiet            print no report and no progress
+      --quiet            print no progress, and no report but that of --json
       --help             print this
 
 Exit status: 0 done; 1 an error, told in one line; 2 wrong usage.

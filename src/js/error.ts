@@ -1,4 +1,7 @@
-/** `format`: the file; `input`: the arguments; `limit`: memory; `unsupported`: this version or this engine. */
+/**
+ * `format`: what a file holds; `input`: the arguments, and files that do not open; `limit`: memory; `unsupported`: what the
+ * engine lacks, or the package's own files that do not load.
+ */
 export type ErrorCode = 'format' | 'input' | 'limit' | 'unsupported';
 
 /** What an error knows besides its text. */

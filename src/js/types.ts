@@ -58,8 +58,8 @@ export interface EstimateOptions {
 
 export interface EstimateResult {
   /**
-   * Unit length, or zero where a point is not finite or its neighbours lie along a line or in one place; as many numbers as
-   * `positions`.
+   * Unit length, or zero where a point is not finite or has no neighbours that tell a plane: none, or all along a line or in
+   * one place; as many numbers as `positions`.
    */
   normals: Float32Array;
   /**
@@ -80,7 +80,7 @@ export interface EstimateResult {
 
 export interface Report {
   points: number;
-  /** Points that got the zero vector: not finite, or without neighbours. */
+  /** Points that got the zero vector. */
   unresolved: number;
   /** Occupied cubes. This and all about cubes and nodes is 0 for the baselines, which have none. */
   cells: number;

@@ -43,7 +43,7 @@ const NONE: u32 = u32::MAX;
 /// be missing if the signs do not need them ([`Orient::needs_positions`]); `density` is theirs, if it is known.
 ///
 /// Towards a position or a direction: one pass over the points. Otherwise linear in the points; besides these and the normals
-/// some 32 bytes for each on smooth surfaces, up to 190 where there is no surface at all.
+/// some 27 bytes for each on smooth surfaces, up to 190 where there is no surface at all.
 pub(crate) fn orient(
     points: Option<&Points>,
     normals: &mut [Vec3],
