@@ -28,7 +28,7 @@ export function percent(part: number, whole: number): string {
 
 const PHASES: Record<string, string> = {
   start: 'starting',
-  load: 'loading the program',
+  load: 'loading the file',
   read: 'reading the points',
   write: 'writing the points',
   cellSize: 'size of the cubes',

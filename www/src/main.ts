@@ -29,13 +29,17 @@ function start(viewer: Viewer): void {
   const session = createSession(store, viewer);
   const input = element<HTMLInputElement>('#file');
   const panel = element<HTMLDetailsElement>('#panel');
+  const canvas = element('#canvas');
   const small = matchMedia('(max-width: 640px)');
   const low = matchMedia('(max-height: 520px)');
   const makeRoom = () => viewer.setMargins(marginsOf(small.matches, low.matches));
   const turnSurfaces = (turning: boolean) => {
-    // Both sides look the same without, and on a small screen the panel hides the cloud.
+    // Without back faces both sides look the same, and on a small screen the panel hides the cloud.
     store.set(turning ? { turning, backs: true } : { turning });
-    if (turning && small.matches) panel.open = false;
+    if (!turning) return;
+    if (small.matches) panel.open = false;
+    // Which hears Enter.
+    canvas.focus();
   };
 
   const actions: Record<string, () => void> = {
@@ -61,6 +65,8 @@ function start(viewer: Viewer): void {
     input.value = '';
   });
   addEventListener('keydown', (event) => {
+    // A key that is held long must not press what takes the focus next.
+    if (event.repeat && event.key === 'Enter' && event.target instanceof HTMLButtonElement) event.preventDefault();
     if (event.key === 'Escape') {
       if (store.state.job) session.cancel();
       else store.set({ turning: false, error: undefined });
@@ -73,7 +79,6 @@ function start(viewer: Viewer): void {
     if (key === 'b') element('#backs').click();
   });
 
-  const canvas = element('#canvas');
   canvas.addEventListener('webglcontextlost', () => store.set({ lost: true }));
   canvas.addEventListener('webglcontextrestored', () => store.set({ lost: false }));
 
@@ -84,7 +89,9 @@ function start(viewer: Viewer): void {
   // On a small screen the panel would hide the cloud: it starts closed there.
   panel.open = !small.matches;
   small.addEventListener('change', () => {
+    const focused = panel.contains(document.activeElement);
     panel.open = !small.matches;
+    if (focused && small.matches) element('#panel > summary').focus();
     makeRoom();
   });
   low.addEventListener('change', makeRoom);
@@ -100,10 +107,13 @@ function start(viewer: Viewer): void {
   else session.warm();
 }
 
-/** What the status line takes, in pixels, with the facts of most scans; a low window does without these. */
+/** What the status line takes, in pixels (style.css), with the facts of most scans; a low window does without these. */
 const STATUS = { width: 396, height: 200, low: 120 };
 
-/** What the panel and the status line cover: the right edge and a corner, or on a small screen top and bottom. */
+/**
+ * What the panel and the status line cover, for a cloud beside that line or above it; on a small screen for one between the
+ * panel's title and that line.
+ */
 function marginsOf(small: boolean, low: boolean): Margins[] {
   const { offsetWidth: width, offsetTop: gap } = element('#panel');
   const title = element('#panel > summary').offsetHeight;

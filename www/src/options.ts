@@ -65,7 +65,7 @@ export function orientOf(kind: OrientKind, up: Up, eye: Place, scanner: Place | 
   return kind;
 }
 
-/** What of the form, and of the axis, changes the normals: the same text for what gives the same. */
+/** What of the form, and of the axis, changes the normals, as a text to compare; where the camera is does not count. */
 export const askedBy = (form: OptionsForm, up: Up): string =>
   JSON.stringify([parseOptions(form), form.orientKind, form.orientKind === 'up' ? up : '']);
 

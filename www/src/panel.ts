@@ -1,4 +1,4 @@
-// Draws the state into the document. Nothing is remembered here: every part is a function of the state.
+// Draws the state into the document. What was drawn last is kept only to leave alone what is the same, and to tell changes.
 import type { Report } from 'bilinormal';
 import { count, duration, measure, percent, phaseName, plural } from './format';
 import { METHODS, askedBy, hasSurfaces, parseOptions } from './options';
@@ -17,7 +17,7 @@ const make = (tag: string, text: string, className = '') =>
 function fact(value: string, name: string, about = ''): HTMLElement {
   const item = make('li', ` ${name}`);
   item.prepend(make('b', value));
-  item.title = about;
+  if (about) item.title = about;
   return item;
 }
 
@@ -74,17 +74,17 @@ export function showState(store: Store): void {
     const save = element<HTMLButtonElement>('[data-do=save]');
     save.disabled = !scan?.hasNormals;
     rest(save, busy);
-    tell(before?.job, job);
 
     showOptions(state, busy);
     showError(error);
     showJob(state);
-    const told =
+    const same =
       before?.scan === scan &&
       before?.report === report &&
       before?.flipped === state.flipped &&
       before?.turnedSurfaces === state.turnedSurfaces;
-    if (!told) showResult(state);
+    if (!same) showResult(state);
+    tell(state, before);
     if (focused?.closest('[hidden]')) moveFocus(state);
   });
 }
@@ -95,9 +95,13 @@ function moveFocus({ scan, job }: State): void {
   element(next).focus();
 }
 
-/** For those who hear the page: what begins. */
-function tell(before: State['job'], job: State['job']): void {
-  if (before?.title !== job?.title) element('#told').textContent = job?.title ?? '';
+/** For those who hear the page: what begins, and what a flip has done. */
+function tell({ job, flipped, turnedSurfaces }: State, before: State | undefined): void {
+  const told = element('#told');
+  if (before?.job?.title !== job?.title) told.textContent = job?.title ?? '';
+  else if (before && !job && (before.flipped !== flipped || before.turnedSurfaces !== turnedSurfaces)) {
+    told.textContent = [...element('#facts').children].map((fact) => fact.textContent).join(', ');
+  }
 }
 
 /** What starts a job does nothing while one runs, but keeps the focus of the keyboard. */
@@ -140,8 +144,11 @@ function showOptions(state: State, busy: boolean): void {
   again.textContent = scan?.hasNormals ? 'Re-run' : 'Compute';
   const pending = !busy && state.used !== undefined && state.used.asked !== askedBy(state, state.up);
   element('#pending').hidden = !pending || problem !== '';
-  again.classList.toggle('primary', pending);
-  element('[data-do=save]').classList.toggle('primary', !pending);
+  if (pending) again.setAttribute('aria-describedby', 'pending');
+  else again.removeAttribute('aria-describedby');
+  const isNext = pending || (!busy && scan !== undefined && !scan.hasNormals);
+  again.classList.toggle('primary', isNext);
+  element('[data-do=save]').classList.toggle('primary', !isNext);
 }
 
 function showError(error: string | undefined): void {
@@ -223,16 +230,22 @@ function signsOf({ components, points }: Report, { scan, used, flipped, turnedSu
   return [fact(`${way} the camera`, 'as it was')];
 }
 
+/** What is the same is left alone, or it would be read out again. */
+function write(selector: string, text: string): void {
+  const to = element(selector);
+  if (to.textContent !== text) to.textContent = text;
+}
+
 function showResult(state: State): void {
   const { scan, report, used } = state;
   element('#status').hidden = scan === undefined;
   if (!scan) return;
-  element('#total').textContent = report ? duration(report.milliseconds.total) : count(scan.points);
+  write('#total', report ? duration(report.milliseconds.total) : count(scan.points));
   const points = plural(scan.points, 'point');
   const remedy = report && report.cellSize > 0 && report.noise === undefined ? ', try the cell Auto' : '';
   const none = report?.unresolved === scan.points ? `: no normal was found${remedy}` : '';
   const label = report ? `for ${count(scan.points)} ${points}${none}` : `${points}, without normals`;
-  element('#total-label').textContent = label;
+  write('#total-label', label);
 
   const facts = element('#facts');
   facts.replaceChildren();

@@ -186,7 +186,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
       if (!shown?.result) return;
       negate(shown.result.normals);
       viewer.refreshNormals();
-      // Both sides look the same without.
+      // Without back faces both sides look the same.
       store.set({ flipped: !store.state.flipped, backs: true });
     },
 

@@ -200,8 +200,19 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     material.shading = wanted === 'colors' && !colors ? 'plain' : wanted;
   }
 
+  /** Turns the axis of the file upwards. */
+  function turn(up: Up): void {
+    turned.rotation.x = { y: 0, z: -Math.PI / 2, '-y': Math.PI }[up];
+  }
+
   function fit(): void {
     if (!bounds) return;
+    // A window without a size is framed when it gets one.
+    framed = true;
+    if (canvas.clientWidth === 0 || canvas.clientHeight === 0) return;
+    // Without damping an update spends what is left of a movement.
+    controls.enableDamping = false;
+    controls.update();
     const [x, y, z] = bounds.extent;
     const box = new Vector3(x, y, z).applyEuler(turned.rotation);
     const flat = 1 - Math.min(1, Math.abs(box.y) / Math.max(Math.abs(box.x), Math.abs(box.z), Number.MIN_VALUE));
@@ -210,13 +221,14 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     const distances = choices.map((choice) => framingDistance(direction, half, choice));
     const least = Math.min(...distances);
     margins = choices[distances.indexOf(least)]!;
-    makeRoom();
+    centre();
     const distance = 1.06 * least;
     controls.target.set(0, 0, 0);
     camera.position.copy(direction).multiplyScalar(distance);
     controls.minDistance = 1e-3;
     controls.maxDistance = Math.max(reach, distance) * 20;
     controls.update();
+    controls.enableDamping = !calm;
     // A jump, not a movement: draw all of it at once.
     lastMove = -Infinity;
     framed = true;
@@ -227,8 +239,10 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   function framingDistance(direction: Vector3, half: Vector3, { top, right: end, bottom, left }: Margins): number {
     const { clientWidth: width, clientHeight: height } = canvas;
     const slope = Math.tan((camera.fov * Math.PI) / 360) / height;
-    const across = slope * Math.max(width - left - end, width / 4);
-    const upright = slope * Math.max(height - top - bottom, height / 4);
+    // Where there is nothing else to choose, what is left may be too little; where there is, it loses.
+    const share = choices.length > 1 ? 0.01 : 0.25;
+    const across = slope * Math.max(width - left - end, share * width);
+    const upright = slope * Math.max(height - top - bottom, share * height);
     const right = new Vector3(0, 1, 0).cross(direction).normalize();
     const above = new Vector3().crossVectors(direction, right);
     let distance = 0;
@@ -245,14 +259,14 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     if (width === 0 || height === 0) return;
     renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     renderer.setSize(width, height, false);
-    camera.aspect = width / height;
     if (framed) fit();
-    else makeRoom();
+    else centre();
   }
 
   /** The middle of what is not covered is the middle of the view. */
-  function makeRoom(): void {
+  function centre(): void {
     const { clientWidth: width, clientHeight: height } = canvas;
+    if (width === 0 || height === 0) return;
     const { top, right, bottom, left } = margins;
     camera.setViewOffset(width, height, (right - left) / 2, (bottom - top) / 2, width, height);
     request();
@@ -332,7 +346,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       reach = bounds.reach / bounds.radius;
       points.position.set(-bounds.centre[0], -bounds.centre[1], -bounds.centre[2]);
       chooseShading();
-      viewer.setUp(up);
+      turn(up);
       fit();
     },
     setNormals(normals, curvatureColors) {
@@ -361,7 +375,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       request();
     },
     setUp(up) {
-      turned.rotation.x = { y: 0, z: -Math.PI / 2, '-y': Math.PI }[up];
+      turn(up);
       if (framed) fit();
       else request();
     },
@@ -372,10 +386,11 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       return points.worldToLocal(camera.position.clone()).toArray();
     },
     setMargins(next) {
+      // A view that was moved stays beside or above what it was.
+      margins = next[choices.indexOf(margins)] ?? next[0]!;
       choices = next;
-      margins = next[0]!;
       if (framed) fit();
-      else makeRoom();
+      else centre();
     },
   };
   return viewer;
