@@ -143,20 +143,21 @@ export async function save(page) {
   return { name: download.suggestedFilename(), bytes: readFileSync(await download.path()) };
 }
 
-/** Once nothing is left to draw: the distinct colours, in steps of 8, in a square in the middle of a view. */
-export async function colorsShown(page, square) {
-  return (await colorsIn(page, square)).length;
+/** Once nothing is left to draw: the distinct colours, in steps of 8, in a square in the middle of a view, or elsewhere. */
+export async function colorsShown(page, area) {
+  return (await colorsIn(page, area)).length;
 }
 
-/** The share, 0 to 1, of a square or another rectangle (`clip`) that has the colour of back faces, which is lit. */
-export async function backsShown(page, square) {
-  const colors = await colorsIn(page, square);
+/** The share, 0 to 1, of such a square that has the colour of back faces, which is lit. */
+export async function backsShown(page, area) {
+  const colors = await colorsIn(page, area);
   const sum = (some) => some.reduce((sum, { pixels }) => sum + pixels, 0);
   return sum(colors.filter(({ red, green, blue }) => red > 2 * green && blue > green && red > blue)) / sum(colors);
 }
 
 const squareAt = (x, y, side) => ({ x: x - side / 2, y: y - side / 2, width: side, height: side });
 
+/** The area is the middle of a square and its side, or any rectangle as `clip`. */
 async function colorsIn(page, { x = 498, y = 400, side = 200, clip = squareAt(x, y, side) } = {}) {
   await page.waitForTimeout(600);
   const shot = await page.screenshot({ clip });

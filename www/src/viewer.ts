@@ -231,6 +231,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     controls.enableDamping = !calm;
     // A jump, not a movement: draw all of it at once.
     lastMove = -Infinity;
+    // The updates above told of a change.
     framed = true;
     request();
   }
@@ -259,6 +260,10 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     if (width === 0 || height === 0) return;
     renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     renderer.setSize(width, height, false);
+    reframe();
+  }
+
+  function reframe(): void {
     if (framed) fit();
     else centre();
   }
@@ -376,8 +381,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     },
     setUp(up) {
       turn(up);
-      if (framed) fit();
-      else request();
+      reframe();
     },
     fit,
     pick,
@@ -389,8 +393,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       // A view that was moved stays beside or above what it was.
       margins = next[choices.indexOf(margins)] ?? next[0]!;
       choices = next;
-      if (framed) fit();
-      else centre();
+      reframe();
     },
   };
   return viewer;
