@@ -1,6 +1,6 @@
 //! Which side of a patch is open to the air.
 
-use super::patches::Patches;
+use super::patches::{Patch, Patches};
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
@@ -19,6 +19,10 @@ const DIRECTIONS: usize = STEPS.len() - 1;
 /// A surface that is open to one half of space sees it with some 9 of the directions.
 const HALF: f32 = 9.0;
 
+/// What a patch that sees that counts against its links. With half as much again the corner of a room would be torn: its floor
+/// and its walls are seen from behind.
+const AIR: f32 = 2.0;
+
 /// What errors call the memory of all this.
 const WHAT: &str = "the open sides";
 
@@ -32,10 +36,11 @@ pub(super) struct Sights {
 
 impl Sights {
     /// For each patch what speaks for its normal to point outwards: its exposure, less where it sees the open from both sides,
-    /// as ground does.
-    pub fn evidence(&self) -> impl Iterator<Item = f32> {
-        let share = |(&exposure, &all): (&f32, &f32)| exposure * (exposure.abs() / all.max(f32::MIN_POSITIVE));
-        self.exposure.iter().zip(&self.all).map(share)
+    /// as ground does, and where it is of few points.
+    pub fn evidence(&self, patches: &Patches) -> impl Iterator<Item = f32> {
+        let share = |exposure: f32, all: f32| exposure * (exposure.abs() / all.max(f32::MIN_POSITIVE));
+        let sights = self.exposure.iter().zip(&self.all);
+        sights.zip(&patches.all).map(move |((&exposure, &all), patch)| AIR * patch.certainty() * share(exposure, all))
     }
 }
 
@@ -69,14 +74,25 @@ pub(super) fn sights(grid: &Grid, patches: &Patches, points: usize, stage: &Stag
         let seen = seen.into_inner();
         // In one direction only: through a gap between cubes that touch at an edge.
         let seen = if seen.count_ones() < 2 { 0 } else { seen };
-        let open = openness(seen);
-        for patch in &patches.all[patches.of_cube(cube)] {
+        let own = &patches.all[patches.of_cube(cube)];
+        for patch in own {
+            let seen = set_bits(seen.into()).filter(|&number| !is_hidden(patch, own, direction(number as usize)));
+            let seen = seen.fold(0, |seen: u32, number| seen | 1 << number);
             let along = |number: u32| (direction(number as usize).as_vec3().normalize().dot(patch.normal) / HALF).abs();
-            sights.exposure.push(open.dot(patch.normal));
+            sights.exposure.push(openness(seen).dot(patch.normal));
             sights.all.push(set_bits(seen.into()).map(along).sum());
         }
     }
     Ok(sights)
+}
+
+/// Whether in a direction another patch of the cube hides the open from one: its plane lies there. Else the two sides of a thin
+/// wall would both see what is before each, and the deep side of a blade's edge what is before the other.
+fn is_hidden(patch: &Patch, own: &[Patch], direction: IVec3) -> bool {
+    own.iter().any(|other| {
+        let apart = other.normal.dot(other.centre - patch.centre);
+        apart * other.normal.dot(direction.as_vec3()) > 0.0
+    })
 }
 
 fn direction(number: usize) -> IVec3 {
@@ -281,11 +297,27 @@ mod tests {
 
     #[test]
     fn what_sees_the_open_from_both_sides_says_little() {
+        let patches = Patches { all: vec![patch(Vec3::ZERO, 100); 3], first: vec![0, 3] };
         let sights = Sights { exposure: vec![0.9, -0.2, 0.0], all: vec![0.9, 2.0, 0.0] };
-        let evidence: Vec<f32> = sights.evidence().collect();
-        assert_eq!(evidence[0], 0.9);
-        assert!((-0.03..0.0).contains(&evidence[1]), "{evidence:?}");
+        let evidence: Vec<f32> = sights.evidence(&patches).collect();
+        assert_eq!(evidence[0], AIR * 0.9);
+        assert!((-0.03 * AIR..0.0).contains(&evidence[1]), "{evidence:?}");
         assert_eq!(evidence[2], 0.0);
+    }
+
+    #[test]
+    fn one_side_of_a_wall_does_not_see_what_lies_behind_the_other() {
+        let wall = [patch(0.3 * Vec3::Z, 9), patch(0.1 * Vec3::Z, 9)];
+        for (number, upwards) in [(0, true), (1, false)] {
+            for direction in (0..DIRECTIONS).map(direction) {
+                let is_before = if upwards { direction.z >= 0 } else { direction.z <= 0 };
+                assert_eq!(!is_hidden(&wall[number], &wall, direction), is_before, "{number} {direction}");
+            }
+        }
+    }
+
+    fn patch(centre: Vec3, points: u32) -> Patch {
+        Patch { centre, normal: Vec3::Z, points, flatness: 1.0 }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use super::air::Sights;
 use super::links::{GRAPH, Link, Links};
-use super::patches::signed;
+use super::patches::{Patches, signed};
 use crate::error::Error;
 use crate::lists::{filled, starts};
 use crate::power::exp2;
@@ -36,15 +36,15 @@ impl Groups {
     /// evidence between the merged ones is added up, so that many weak links outvote a strong wrong one. `sights` tell
     /// what speaks for a patch not to be flipped. A round at least halves the groups that gain by merging; few do so later,
     /// or wait until none does: linear in the links but for odd clouds, and never more than [`ROUNDS`] times as long.
-    pub fn of(mut links: Links, sights: &Sights, stage: &Stage) -> Result<Self, Error> {
-        let patches = links.len();
+    pub fn of(mut links: Links, sights: &Sights, patches: &Patches, stage: &Stage) -> Result<Self, Error> {
+        let count = links.len();
         let mut levels = Vec::new();
-        let (mut own, mut component) = (filled(0.0, patches, GRAPH)?, filled(0u32, patches, GRAPH)?);
-        let mut sizes = filled(1, patches, GRAPH)?;
-        own.iter_mut().zip(sights.evidence()).for_each(|(own, evidence)| *own = evidence);
+        let (mut own, mut component) = (filled(0.0, count, GRAPH)?, filled(0u32, count, GRAPH)?);
+        let mut sizes = filled(1, count, GRAPH)?;
+        own.iter_mut().zip(sights.evidence(patches)).for_each(|(own, evidence)| *own = evidence);
         component.iter_mut().zip(0..).for_each(|(component, one)| *component = one);
         for _ in 0..ROUNDS {
-            let done = |groups: usize| 1.0 - groups as f64 / patches.max(1) as f64;
+            let done = |groups: usize| 1.0 - groups as f64 / count.max(1) as f64;
             stage.tell(done(own.len()))?;
             let Some(Merging { group, flipped, groups }) = merge(&links, &own, &sizes)? else { break };
             stage.tell(done((own.len() + groups) / 2))?;
@@ -118,8 +118,8 @@ impl Groups {
     }
 }
 
-/// Groups that agree no better than this, for each patch along the side of a square of as many as the smaller has, only touch:
-/// they are surfaces of their own.
+/// Groups that agree no better than this, for each patch but one along the side of a square of as many as the smaller has, only
+/// touch: they are surfaces of their own. One patch is none.
 const TOUCH: f32 = 0.1;
 
 /// How often groups merge at the most; five to twelve times is what scans need.
@@ -195,7 +195,7 @@ fn strongest(links: &Links, own: &[f32], sizes: &[u32], one: usize, at_any_price
         let loss = if is_contrary { 2.0 * own[one].abs().min(own[to].abs()) } else { 0.0 };
         let is_first = |best: Link| evidence - loss == most && link.to < best.to;
         if (evidence - loss > most || best.is_some_and(is_first))
-            && evidence > TOUCH * (sizes[one].min(sizes[to]) as f32).sqrt()
+            && evidence > TOUCH * ((sizes[one].min(sizes[to]) as f32).sqrt() - 1.0)
         {
             (best, most) = (Some(link), evidence - loss);
         }

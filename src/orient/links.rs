@@ -37,8 +37,16 @@ struct Run {
     end: usize,
 }
 
-/// With less noise the patches of a surface lie on arcs nearly exactly; what does not is another sheet nearby.
-const CLEAN: f32 = 0.05;
+/// The likeness of two patches is raised to about this over the variance of the noise: that moves patches off their surface, and
+/// so makes them unlike; what more makes them so is that they are of two.
+const SHARPNESS: f32 = 0.2;
+
+/// How often it is squared at least and at most: noise is not all that makes patches of one surface unlike.
+const LEAST_SQUARINGS: u32 = 2;
+const MOST_SQUARINGS: u32 = 5;
+
+/// How much the least of these powers counts beside the one that noise allows: across some edges there is nothing more.
+const BLUNT: f32 = 0.2;
 
 /// Less is no evidence, and costs memory.
 const LEAST: f32 = 0.01;
@@ -50,7 +58,7 @@ impl Links {
     /// Links every patch to those in its cube and the 26 round it; `noise` is that of the points, in edges. One pass over the
     /// patches.
     pub fn of(grid: &Grid, patches: &Patches, noise: f32, stage: &Stage) -> Result<Self, Error> {
-        let is_clean = noise < CLEAN;
+        let squarings = squarings(noise);
         let runs = Filling::new(patches.all.len(), GRAPH)?;
         let lists = stage.collect(grid.blocks.len(), GRAPH, &|block| {
             let mut surroundings = Surroundings::new();
@@ -72,7 +80,7 @@ impl Links {
                     let (start, patch) = (links.len(), &patches.all[own]);
                     for (others, step) in &near {
                         for to in others.clone() {
-                            let evidence = evidence(patch, &patches.all[to], *step, is_clean);
+                            let evidence = evidence(patch, &patches.all[to], *step, squarings);
                             if to != own && evidence.abs() > LEAST {
                                 links.push(Link { to: to as u32, evidence });
                             }
@@ -123,6 +131,14 @@ impl Links {
     }
 }
 
+/// How often the likeness of patches is squared; `noise` is that of the points, in edges.
+fn squarings(noise: f32) -> u32 {
+    let root_2 = std::f32::consts::SQRT_2;
+    (LEAST_SQUARINGS..MOST_SQUARINGS)
+        .find(|&squarings| noise * noise * root_2 * (1u32 << squarings) as f32 > SHARPNESS)
+        .unwrap_or(MOST_SQUARINGS)
+}
+
 /// Whether two patches agree: the second one's cube lies `step` cubes from the first one's.
 ///
 /// The first normal is reflected at the plane across the line between their centres: so the normals at both ends of an arc
@@ -131,7 +147,7 @@ impl Links {
 /// data sets", 2004). The less alike the picture, the more likely these are two sheets: hence the power. A line along the
 /// normals is no evidence, as noise of one surface and both sides of a wall look the same.
 #[inline(always)]
-fn evidence(a: &Patch, b: &Patch, step: Vec3, is_clean: bool) -> f32 {
+fn evidence(a: &Patch, b: &Patch, step: Vec3, squarings: u32) -> f32 {
     // So that the other way round it is the opposite to the bit.
     let line = step + (b.centre - a.centre);
     let square = line.length_squared();
@@ -144,7 +160,54 @@ fn evidence(a: &Patch, b: &Patch, step: Vec3, is_clean: bool) -> f32 {
     let (x, y) = (line.dot(a.normal) / length, line.dot(b.normal) / length);
     let reflected = dot - 2.0 * (x * y);
     let (x, y) = (x.abs(), y.abs());
-    // To the power of 9, or where noise makes them less alike 5.
     let fourth = (reflected * reflected) * (reflected * reflected);
-    reflected * if is_clean { fourth * fourth } else { fourth } * (1.0 - x * y)
+    let sharp = (LEAST_SQUARINGS..squarings).fold(fourth, |power, _| power * power);
+    let trust = a.flatness * b.flatness * a.certainty().min(b.certainty()).sqrt();
+    reflected * ((sharp + BLUNT * fourth) / (1.0 + BLUNT)) * (1.0 - x * y) * trust
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn patch(centre: Vec3, normal: Vec3) -> Patch {
+        Patch { centre, normal, points: 16, flatness: 1.0 }
+    }
+
+    #[test]
+    fn patches_on_an_arc_agree_whatever_the_noise() {
+        let on_arc = |angle: f32| {
+            let normal = Vec3::new(angle.sin(), 0.0, angle.cos());
+            patch(normal, normal)
+        };
+        let (a, b) = (on_arc(0.2), on_arc(0.7));
+        for noise in [0.0, 0.1, 0.3] {
+            let evidence = evidence(&a, &b, Vec3::ZERO, squarings(noise));
+            // Less what the line between them has of the normals.
+            assert!((evidence - (1.0 - 0.25f32.sin().powi(2))).abs() < 1e-4, "{noise}: {evidence}");
+        }
+    }
+
+    /// The far side of a thin wall, askew, whose normal says the opposite of the truth.
+    #[test]
+    fn where_there_is_no_noise_another_sheet_is_none_of_the_same_surface() {
+        let (a, b) = (patch(Vec3::ZERO, Vec3::Z), patch(Vec3::new(0.0, 0.0, 0.4), Vec3::Z));
+        let at = |noise: f32| evidence(&a, &b, Vec3::X, squarings(noise));
+        assert!((0.0..0.1).contains(&at(0.0)), "{}", at(0.0));
+        assert!(at(0.3) > 2.0 * at(0.0), "{}", at(0.3));
+    }
+
+    #[test]
+    fn a_few_points_off_their_plane_say_little() {
+        let (a, b) = (patch(Vec3::ZERO, Vec3::Z), patch(Vec3::X, Vec3::Z));
+        let say = |points, flatness| evidence(&a, &Patch { points, flatness, ..b }, Vec3::ZERO, 5);
+        assert_eq!(say(16, 1.0), 1.0);
+        assert!(say(2, 1.0) <= 0.5 && say(16, 0.4) <= 0.4);
+    }
+
+    #[test]
+    fn the_less_noise_the_sharper() {
+        let powers: Vec<u32> = [0.0, 0.08, 0.12, 0.16, 0.3].map(squarings).to_vec();
+        assert_eq!(powers, [5, 5, 4, 3, 2]);
+    }
 }

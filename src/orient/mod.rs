@@ -105,7 +105,7 @@ fn surfaces(
     grid.placed = Vec::new();
     let sights = air::sights(&grid, &patches, points.len(), &stage.part(0.5..0.55))?;
     let links = Links::of(&grid, &patches, noise, &stage.part(0.55..0.7))?;
-    let groups = Groups::of(links, &sights, &stage.part(0.7..0.85))?;
+    let groups = Groups::of(links, &sights, &patches, &stage.part(0.7..0.85))?;
     let choice = stage.part(0.85..0.95);
     let mut signs = match options.orient {
         Orient::Outward => Signs::outward(groups, &choice)?,

@@ -19,6 +19,15 @@ pub(super) struct Patch {
     /// Their mean normal, a unit vector; its sign is that of the first of them.
     pub normal: Vec3,
     pub points: u32,
+    /// How well they lie on its plane, from 1 down to 0: beside a sharp edge some have the normal of the face beyond.
+    pub flatness: f32,
+}
+
+impl Patch {
+    /// How much there is of it, up to 1: few points may be anything.
+    pub fn certainty(&self) -> f32 {
+        (self.points as f32 / CERTAIN).min(1.0)
+    }
 }
 
 /// The patches of all cubes.
@@ -76,11 +85,41 @@ const COSINE_SQUARED: f32 = 0.72;
 const THICKNESS: f32 = 0.1;
 const DEVIATIONS: f32 = 2.2;
 
+/// Points that lie so far from their plane, in edges, make half of a patch's flatness, or so many times the noise if that is
+/// more.
+const UNEVEN: f32 = 0.04;
+const UNEVEN_DEVIATIONS: f32 = 4.0;
+
+/// Patches of so many points are certain.
+const CERTAIN: f32 = 8.0;
+
+/// How far the points of a patch may lie off its plane, in edges.
+#[derive(Clone, Copy)]
+struct Limits {
+    /// To be one of them.
+    thickness: f32,
+    /// The variance at which the patch is half as flat.
+    uneven: f32,
+}
+
+impl Limits {
+    /// Where points lie so far off their surface.
+    fn of(noise: f32) -> Self {
+        let uneven = UNEVEN.max(UNEVEN_DEVIATIONS * noise);
+        Self { thickness: THICKNESS.max(DEVIATIONS * noise), uneven: uneven * uneven }
+    }
+
+    /// The flatness of so many points, with the sum of their square distances from the plane.
+    fn flatness(&self, squares: f32, points: u32) -> f32 {
+        1.0 / (1.0 + squares / (points as f32 * self.uneven))
+    }
+}
+
 impl Patches {
     /// One pass over the points; `noise` is theirs, in edges.
     pub fn of(grid: &Grid, normals: &[Vec3], noise: f32, stage: &Stage) -> Result<(Self, Members), Error> {
         const WHAT: &str = "the patches";
-        let thickness = THICKNESS.max(DEVIATIONS * noise);
+        let limits = Limits::of(noise);
         let (numbers, of_point) = (Filling::new(grid.placed.len(), WHAT)?, Filling::new(grid.placed.len(), WHAT)?);
         let counts = Filling::<u32>::new(grid.cubes(), WHAT)?;
         let found = stage.collect(grid.blocks.len(), WHAT, &|block| {
@@ -104,7 +143,7 @@ impl Patches {
                     let memberships = of_point.split_off_mut(..points.len()).unwrap_or_default();
                     grow(&mut order, points.len(), WHAT)?;
                     grow(&mut patches, MOST, WHAT)?;
-                    split(points, own, cube_centre(bit), thickness, &mut order, &mut patches, memberships);
+                    split(points, own, cube_centre(bit), limits, &mut order, &mut patches, memberships);
                     // SAFETY: a cube belongs to one brick.
                     unsafe { counts.write(cube, (patches.len() - before) as u32) };
                 }
@@ -129,13 +168,13 @@ fn split(
     points: &[Placed],
     normals: &[Vec3],
     centre: Vec3,
-    thickness: f32,
+    limits: Limits,
     order: &mut Vec<(u64, u32)>,
     patches: &mut Vec<Patch>,
     of_point: &mut [MaybeUninit<Membership>],
 ) {
     let first = patches.len();
-    if let Some(patch) = whole(points, normals, centre, thickness) {
+    if let Some(patch) = whole(points, normals, centre, limits) {
         patches.push(patch);
         for (membership, &normal) in of_point.iter_mut().zip(normals) {
             membership.write(Membership::new(0, patch.normal.dot(normal) < 0.0));
@@ -144,24 +183,29 @@ fn split(
     }
     // By place, so that the order of the input does not matter.
     order.clear();
-    order.extend(points.iter().enumerate().map(|(i, point)| (key(point.local), i as u32)));
-    sort_few(order);
-    for &(_, i) in &*order {
-        let (place, normal) = (points[i as usize].local - centre, normals[i as usize]);
+    for (i, (point, &normal)) in points.iter().zip(normals).enumerate() {
         if normal == Vec3::ZERO {
-            of_point[i as usize].write(Membership::NONE);
-            continue;
+            of_point[i].write(Membership::NONE);
+        } else {
+            order.push((key(point.local), i as u32));
         }
+    }
+    sort_few(order);
+    // From here on the number of each one's patch in place of its key.
+    for (number_or_key, i) in &mut *order {
+        let i = *i as usize;
+        let (place, normal) = (points[i].local - centre, normals[i]);
         let own = &patches[first..];
-        let fits = own.iter().enumerate().filter_map(|(i, patch)| Some((i, misfit(patch, place, normal, thickness)?)));
-        let mut best = fits.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(i, _)| i);
+        let misfit = |patch: &Patch| misfit(patch, place, normal, limits.thickness);
+        let fits = own.iter().enumerate().filter_map(|(number, patch)| Some((number, misfit(patch)?)));
+        let mut best = fits.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(number, _)| number);
         if best.is_none() && own.len() == MOST {
             let distance = |patch: &Patch| (patch.centre / patch.points as f32).distance_squared(place);
             best = (0..MOST).min_by(|&a, &b| distance(&own[a]).total_cmp(&distance(&own[b])));
         }
         let number = best.unwrap_or(own.len());
         if number == own.len() {
-            patches.push(Patch { centre: Vec3::ZERO, normal: Vec3::ZERO, points: 0 });
+            patches.push(Patch { centre: Vec3::ZERO, normal: Vec3::ZERO, points: 0, flatness: 0.0 });
         }
         // Sums until all are in.
         let patch = &mut patches[first + number];
@@ -169,28 +213,42 @@ fn split(
         patch.centre += place;
         patch.normal += aligned(normal, patch.normal);
         patch.points += 1;
-        of_point[i as usize].write(Membership::new(number, is_opposite));
+        of_point[i].write(Membership::new(number, is_opposite));
+        *number_or_key = number as u64;
     }
-    for patch in &mut patches[first..] {
+    let own = &mut patches[first..];
+    for patch in &mut *own {
         patch.centre /= patch.points as f32;
         patch.normal = patch.normal.normalize_or(Vec3::Z);
+    }
+    for &(number, i) in &*order {
+        let patch = &mut own[number as usize];
+        let off = (points[i as usize].local - centre - patch.centre).dot(patch.normal);
+        patch.flatness += off * off;
+    }
+    for patch in own {
+        patch.flatness = limits.flatness(patch.flatness, patch.points);
     }
 }
 
 /// All points of a cube as one patch, if they lie on one: so most do, and need not be sorted.
-fn whole(points: &[Placed], normals: &[Vec3], centre: Vec3, thickness: f32) -> Option<Patch> {
+fn whole(points: &[Placed], normals: &[Vec3], centre: Vec3, limits: Limits) -> Option<Patch> {
     let (mut place, mut normal) = (Vec3::ZERO, Vec3::ZERO);
     for (point, &own) in points.iter().zip(normals) {
         place += point.local;
         normal += aligned(own, normal);
     }
     let (place, normal) = (place / points.len() as f32, normal.try_normalize()?);
-    let fits = |(point, own): (&Placed, &Vec3)| {
-        let along = normal.dot(*own);
-        along * along >= COSINE_SQUARED && (point.local - place).dot(normal).abs() < thickness
-    };
-    let patch = Patch { centre: place - centre, normal, points: points.len() as u32 };
-    points.iter().zip(normals).all(fits).then_some(patch)
+    let mut squares = 0.0;
+    for (point, &own) in points.iter().zip(normals) {
+        let (along, off) = (normal.dot(own), (point.local - place).dot(normal));
+        if along * along < COSINE_SQUARED || off.abs() >= limits.thickness {
+            return None;
+        }
+        squares += off * off;
+    }
+    let count = points.len() as u32;
+    Some(Patch { centre: place - centre, normal, points: count, flatness: limits.flatness(squares, count) })
 }
 
 /// A normal, or its opposite if that is more like `other`.
