@@ -188,19 +188,14 @@ impl Voxels {
                     free[place] = open[place] & !occupied[place];
                 }
             }
-            self.each_cube(grid, z, &|voxel, cube| {
-                let (word, bit) = self.bit(voxel);
-                if open[word] & bit != 0 {
-                    see(cube);
-                }
-            });
+            self.each_open(grid, z, &open, see);
             std::mem::swap(&mut free, &mut beyond);
         }
         Ok(())
     }
 
-    /// Calls `work` with the voxel and the number of every cube in a plane of voxels.
-    fn each_cube(&self, grid: &Grid, z: i32, work: &dyn Fn(IVec3, usize)) {
+    /// Calls `see` with the number of every cube in a plane of voxels whose own is open.
+    fn each_open(&self, grid: &Grid, z: i32, open: &[u64], see: &dyn Fn(usize)) {
         let plane = |brick: i32, cube: i32| (BRICK * brick + cube - self.first.z) >> self.doublings;
         let start = self.bricks.partition_point(|&(brick, _)| plane(brick, BRICK - 1) < z);
         let end = self.bricks.partition_point(|&(brick, _)| plane(brick, 0) <= z);
@@ -208,12 +203,27 @@ impl Voxels {
             let brick = brick as usize;
             let own =
                 (0..BRICK).filter(|&cube| plane(layer, cube) == z).fold(0, |own, cube| own | 0xFFFF << (16 * cube));
-            for bit in set_bits(grid.masks[brick] & own) {
-                if let Some(voxel) = self.of_cube(grid.bricks.places[brick], bit) {
-                    work(voxel, grid.cube(brick, bit) as usize);
-                }
+            for bit in set_bits(self.open_of(grid.bricks.places[brick], grid.masks[brick] & own, open)) {
+                see(grid.cube(brick, bit) as usize);
             }
         }
+    }
+
+    /// Of some cubes of a brick, as bits, in one plane of voxels, those whose own is open.
+    fn open_of(&self, brick: IVec3, cubes: u64, open: &[u64]) -> u64 {
+        if self.doublings > 0 {
+            let is_open = |voxel: IVec3| {
+                let (word, bit) = self.bit(voxel);
+                open[word] & bit != 0
+            };
+            let cubes = set_bits(cubes).filter(|&bit| self.of_cube(brick, bit).is_some_and(is_open));
+            return cubes.fold(0, |open, bit| open | 1 << bit);
+        }
+        // Voxels are cubes then, and their rows begin with a brick: the four of one row of the brick stand in one word.
+        let Some(first) = self.of_cube(brick, 0) else { return 0 };
+        let rows = (first.y..first.y + BRICK).map(|y| self.row(y).start + first.x as usize / 64);
+        let layer = rows.rev().fold(0, |layer, word| layer << BRICK | open[word] >> (first.x % 64) & 0xF);
+        cubes & (layer * 0x0001_0001_0001_0001)
     }
 
     /// The voxel of a cube, unless that strays.
