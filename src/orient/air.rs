@@ -19,8 +19,8 @@ const DIRECTIONS: usize = STEPS.len() - 1;
 /// A surface that is open to one half of space sees it with some 9 of the directions.
 const HALF: f32 = 9.0;
 
-/// What a patch that sees that counts against its links. With half as much again the corner of a room would be torn: its floor
-/// and its walls are seen from behind.
+/// What it counts to see that, against links that count up to 1. With 1.7 walls thinner than two spacings get one sign for both
+/// sides, with 2.5 the ends of tubes as thin are torn, with 4 the corners of rooms, which are seen from behind.
 const AIR: f32 = 2.0;
 
 /// What errors call the memory of all this.

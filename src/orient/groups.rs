@@ -70,11 +70,11 @@ impl Groups {
 
     /// Whether to flip each patch, so that the sum of all evidence becomes large. Linear in the links.
     pub fn signs(&self, stage: &Stage) -> Result<Vec<bool>, Error> {
-        let mut flipped = self.descend(f32::INFINITY, 1.0, &stage.part(0.0..0.4))?;
+        let mut flipped = self.descend(1.0, false, &stage.part(0.0..0.4))?;
         let Some(Level { links, own, .. }) = self.levels.first() else { return Ok(flipped) };
         // Flipping one small group after the other does not reach a far better choice behind worse ones, as where both
         // sides of a thin noisy wall were taken for one.
-        let bold = self.descend(f32::INFINITY, BOLDNESS, &stage.part(0.4..0.8))?;
+        let bold = self.descend(BOLDNESS, false, &stage.part(0.4..0.8))?;
         // Both were mended last of all.
         if bold == flipped {
             return Ok(flipped);
@@ -93,14 +93,14 @@ impl Groups {
     }
 
     /// The same where what speaks for a sign by itself may mislead. For the patches of a group that adds up like its area, the
-    /// evidence of its neighbours only like its rim: beyond `span` patches the former is made to grow like the rim too.
-    pub fn cautious_signs(&self, span: f32, stage: &Stage) -> Result<Vec<bool>, Error> {
-        self.descend(span, 1.0, stage)
+    /// evidence of its neighbours only like its rim: the former is made to grow like that too.
+    pub fn cautious_signs(&self, stage: &Stage) -> Result<Vec<bool>, Error> {
+        self.descend(1.0, true, stage)
     }
 
     /// From the components to the patches: whatever gains by being flipped is. `trust` is the weight of what speaks for a sign
-    /// by itself.
-    fn descend(&self, span: f32, trust: f32, stage: &Stage) -> Result<Vec<bool>, Error> {
+    /// by itself, which in a group may count like its rim.
+    fn descend(&self, trust: f32, like_rim: bool, stage: &Stage) -> Result<Vec<bool>, Error> {
         let mut flipped = filled(false, self.own.len(), GRAPH)?;
         flipped.iter_mut().zip(&self.own).for_each(|(flipped, own)| *flipped = *own < 0.0);
         for (number, Level { links, own, sizes, group, flipped: within }) in self.levels.iter().enumerate().rev() {
@@ -111,7 +111,8 @@ impl Groups {
                 *finer = within ^ flipped[group as usize];
             }
             flipped = finer;
-            let share = |one: usize| trust * own[one] * (span / sizes[one] as f32).sqrt().min(1.0);
+            let rim = |one: usize| if like_rim { (sizes[one] as f32).sqrt().recip() } else { 1.0 };
+            let share = |one: usize| trust * own[one] * rim(one);
             mend(links, &share, &mut flipped)?;
         }
         Ok(flipped)

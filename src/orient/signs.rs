@@ -19,10 +19,6 @@ pub(super) struct Signs {
     pub components: usize,
 }
 
-/// How many patches of a group count fully for what lies in the open. Few: an open box, or the corner of a room, is seen from
-/// its wrong side too, and its edges must outweigh that; at most as many as a spike has.
-const SPAN: f32 = 4.0;
-
 /// A surface that sees so much more of the open on one side than on the other is closed. Rooms from inside have 0.3.
 pub(super) const CLOSED: f64 = 0.5;
 
@@ -38,7 +34,7 @@ impl Signs {
         let mut flipped = groups.signs(&stage.part(0.0..0.5))?;
         let is_closed = closed(&groups, sights, &flipped)?;
         if is_closed.contains(&false) {
-            let cautious = groups.cautious_signs(SPAN, &stage.part(0.5..1.0))?;
+            let cautious = groups.cautious_signs(&stage.part(0.5..1.0))?;
             for ((flipped, cautious), &component) in flipped.iter_mut().zip(cautious).zip(&groups.component) {
                 if !is_closed[component as usize] {
                     *flipped = cautious;
