@@ -380,7 +380,7 @@ fn edges_outweigh_what_is_seen_from_the_wrong_side() {
 
 #[test]
 fn a_surface_with_one_side_is_not_called_right() {
-    // Closed surfaces have more than 0.5.
+    // Closed surfaces have more than 0.6.
     for (noise, bound) in [(0.0, 0.2), (0.0012, 0.2), (0.006, 0.2), (0.012, 0.4)] {
         let cloud = Cloud { points: moebius(100_000, 16), normals: vec![] }.noisy(noise, 9);
         for how in [Orient::Consistent, Orient::Outward] {
