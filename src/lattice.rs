@@ -156,7 +156,13 @@ pub(crate) fn cube_place(bit: u32) -> IVec3 {
     IVec3::new((bit & 3) as i32, (bit >> 2 & 3) as i32, (bit >> 4) as i32)
 }
 
-/// Its centre.
+/// The bit of the cube at a place in its brick.
+#[inline(always)]
+pub(crate) fn cube_bit(place: IVec3) -> u32 {
+    (place.x | place.y << 2 | place.z << 4) as u32
+}
+
+/// The centre of the cube with bit `bit`, in the brick.
 #[inline]
 pub(crate) fn cube_centre(bit: u32) -> Vec3 {
     cube_place(bit).as_vec3() + 0.5

@@ -378,6 +378,73 @@ fn edges_outweigh_what_is_seen_from_the_wrong_side() {
     assert_eq!(right.max(1.0 - right), 1.0);
 }
 
+/// The corner of a room with balls in it: what a scanner there sees of the corner is its inside, and nothing else tells that.
+/// Seen from one place only the balls lack their far halves, and what hides behind them is missing from the corner.
+#[test]
+fn an_open_surface_faces_what_stands_before_it() {
+    let balls = [([0.3, 0.35, 0.3], 0.12), ([0.65, 0.3, 0.25], 0.1), ([0.4, 0.7, 0.45], 0.13), ([0.7, 0.7, 0.2], 0.1)];
+    let camera = [1.9, 1.6, 1.4];
+    for (name, sees_all) in [("all", true), ("from one place", false)] {
+        let mut random = Random(29);
+        let corner = (0..80_000).map(|_| {
+            let (axis, u, v) = ((random.unit() * 3.0) as usize, random.unit(), random.unit());
+            let (mut point, mut normal) = ([0.0; 3], [0.0; 3]);
+            (point[(axis + 1) % 3], point[(axis + 2) % 3], normal[axis]) = (u, v, 1.0);
+            (point, normal)
+        });
+        let mut samples: Vec<_> = corner.collect();
+        samples.extend((0..24_000).map(|i| {
+            let ((centre, radius), normal) = (balls[i % balls.len()], random.direction());
+            ([0, 1, 2].map(|axis| centre[axis] + radius * normal[axis]), normal)
+        }));
+        if !sees_all {
+            samples.retain(|&(point, normal)| {
+                let to: [f64; 3] = [0, 1, 2].map(|axis| camera[axis] - point[axis]);
+                let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+                dot(to, normal) > 0.0
+                    && balls.iter().all(|&(centre, radius)| {
+                        let from: [f64; 3] = [0, 1, 2].map(|axis| centre[axis] - point[axis]);
+                        let along = dot(from, to) / dot(to, to);
+                        along < 1e-6 || dot(from, from) - along * along * dot(to, to) > radius * radius * 0.9999
+                    })
+            });
+        }
+        let cloud = Cloud::of(samples.into_iter().map(|(point, normal)| (turn(point), turn(normal))));
+        let result = orient(&cloud.points, Orient::Consistent);
+        let right = share_right(&result.normals, &cloud.normals);
+        assert!(right > 0.999, "{name}: {right}, {:?}", components(&result));
+        assert_eq!(components(&result)[0].side, Side::Sight, "{name}");
+    }
+}
+
+/// What stands on it is one surface with it, and neither its volume nor the convention says which side is up.
+#[test]
+fn ground_faces_what_stands_on_it() {
+    for (seed, height) in [(51, 0.3), (52, 0.8)] {
+        let mut random = Random(seed);
+        let walls = 1.6 * height;
+        let cloud = Cloud::of((0..100_000).map(|_| {
+            let (x, y, share) = (random.signed(), random.signed(), random.unit() * (4.0 + walls));
+            // Half of a box without a floor is as wide as 0.2; downwards, so that the convention says the opposite.
+            let is_under = x.abs() < 0.2 && y.abs() < 0.2;
+            let (point, normal) = if share < 4.0 {
+                ([x, y, if is_under { -height } else { 0.0 }], [0.0, 0.0, -1.0])
+            } else {
+                let (side, along, z) = (if x < 0.0 { -1.0 } else { 1.0 }, 0.2 * y, -height * random.unit());
+                if random.unit() < 0.5 {
+                    ([0.2 * side, along, z], [side, 0.0, 0.0])
+                } else {
+                    ([along, 0.2 * side, z], [0.0, side, 0.0])
+                }
+            };
+            (turn(point), turn(normal))
+        }));
+        let result = orient(&cloud.points, Orient::Consistent);
+        let right = share_right(&result.normals, &cloud.normals);
+        assert!(right > 0.999, "{height}: {right}, {:?}", components(&result)[0]);
+    }
+}
+
 #[test]
 fn a_surface_with_one_side_is_not_called_right() {
     // Closed surfaces have more than 0.6.

@@ -2,6 +2,7 @@
 // the outside of. Samplers as there; normals point outwards.
 
 import { SHAPES as KNOWN } from '../accuracy/shapes.mjs';
+import { scene } from './scene.mjs';
 
 const TAU = 2 * Math.PI;
 const signed = (random) => 2 * random() - 1;
@@ -141,4 +142,6 @@ export const SHAPES = {
   moebius: { shape: moebius, open: true, sides: false },
   bracket: { shape: bracket, noise: 'noise0.12' },
   star: { shape: star, noise: 'noise0.12' },
+  scene: { shape: scene(3), noise: 'noise0.12' },
+  view: { shape: scene(1), noise: 'noise0.12' },
 };

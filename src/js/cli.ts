@@ -314,7 +314,12 @@ function format(report: Report, { method = 'bilinear' }: EstimateOptions): strin
 
 /** The largest of the surfaces that were given one sign each; all of many would not fit a screen. */
 function surfaces({ count, largest }: Report['components'] = { count: 0, largest: [] }): [string, string][] {
-  const ways = { air: 'outwards', volume: 'away from the middle', convention: 'to a side by convention' };
+  const ways = {
+    air: 'outwards',
+    volume: 'away from the middle',
+    sight: 'towards what stands before them',
+    convention: 'to a side by convention',
+  };
   const shown = largest.slice(0, 4).map(({ points, side, confidence }) => {
     const sure = side === 'convention' ? '' : `, ${Math.round(100 * confidence)} % sure`;
     return `${points.toLocaleString('en')} points ${ways[side]}${sure}`;

@@ -19,6 +19,16 @@ pub struct Components {
     pub largest: Vec<Component>,
 }
 
+impl Components {
+    /// Of what was decided for all, the largest first.
+    pub(super) fn of(decisions: &[Decision]) -> Result<Self, Error> {
+        let mut largest = Vec::new();
+        reserve(&mut largest, decisions.len().min(TOLD), WHAT)?;
+        largest.extend(decisions.iter().take(TOLD).map(|decision| decision.component));
+        Ok(Self { count: decisions.len() as u64, largest })
+    }
+}
+
 /// One surface in itself: what is not linked to any other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Component {
@@ -28,7 +38,7 @@ pub struct Component {
     pub side: Side,
     /// How much more speaks for that side than for the other: 0 is a guess, 1 is sure. By the air of all that is seen of the
     /// open how much more is seen from one side; for what sees nothing of it how much volume there is, of that of a sphere, or
-    /// of its pieces.
+    /// of its pieces; by sight, half of how much more looks at one side, of all that does.
     pub confidence: f64,
 }
 
@@ -40,6 +50,8 @@ pub enum Side {
     /// The volume: the surface is open, or hidden, and most of its normals point away from its middle, or if it is long and thin
     /// from the middles of its parts.
     Volume,
+    /// What stands before it: it is looked at from one side.
+    Sight,
     /// Nothing: the surface is open and flat. By convention `x + 2y + 4z >= 0` for its mean normal.
     Convention,
 }
@@ -50,9 +62,18 @@ impl Side {
         match self {
             Self::Air => "air",
             Self::Volume => "volume",
+            Self::Sight => "sight",
             Self::Convention => "convention",
         }
     }
+}
+
+/// What was decided for a component.
+pub(super) struct Decision {
+    pub component: Component,
+    pub patches: u64,
+    /// Of that of a sphere, or of its pieces.
+    pub volume: f64,
 }
 
 /// What errors call the memory of all this.
@@ -129,7 +150,7 @@ impl Part {
 
 impl Sums {
     /// What told the outside, and whether the normals point inwards.
-    fn decide(&self) -> (Component, bool) {
+    fn decide(&self) -> (Decision, bool) {
         let share = |part: f64, all: f64| if all > 0.0 { part / all } else { 0.0 };
         let air = share(self.exposure, self.sight);
         let mut volume = share(self.flux - self.place.dot(self.normal) / self.points as f64, self.reach);
@@ -141,8 +162,11 @@ impl Sums {
             volume = if is_all_round && bulge.abs() >= LEAST_BULGE { bulge } else { 0.0 };
         }
         let is_seen = self.sight >= LEAST_SIGHT * self.patches as f64;
-        let told =
-            |side, confidence: f64| Component { points: self.points, side, confidence: confidence.abs().min(1.0) };
+        let told = |side, confidence: f64| Decision {
+            component: Component { points: self.points, side, confidence: confidence.abs().min(1.0) },
+            patches: self.patches,
+            volume: volume.abs(),
+        };
         if is_seen && air.abs() > CLOSED {
             (told(Side::Air, air), air < 0.0)
         } else if volume.abs() >= LEAST_VOLUME {
@@ -168,7 +192,12 @@ fn add_up(parts: &mut Vec<Part>, corner: DVec3, all: &mut [Sums]) {
 }
 
 /// Turns the components that face inwards, tells what decided and how sure that is, and numbers them by size.
-pub(super) fn decide(grid: &Grid, patches: &Patches, sights: &Sights, signs: &mut Signs) -> Result<Components, Error> {
+pub(super) fn decide(
+    grid: &Grid,
+    patches: &Patches,
+    sights: &Sights,
+    signs: &mut Signs,
+) -> Result<Vec<Decision>, Error> {
     let mut all = filled(Sums::default(), signs.components, WHAT)?;
     let corner = |brick: usize| f64::from(BRICK) * grid.bricks.places[brick].as_dvec3();
     // The patches, their bricks, and where they are in those.
@@ -211,15 +240,13 @@ pub(super) fn decide(grid: &Grid, patches: &Patches, sights: &Sights, signs: &mu
         sums.reach += f64::from(patches.all[i].points) * place.distance(sums.place / sums.points as f64);
     }
     all.sort_unstable_by_key(|sums| (Reverse(sums.points), sums.number));
-    let mut components = Components { count: all.len() as u64, largest: Vec::new() };
-    reserve(&mut components.largest, all.len().min(TOLD), WHAT)?;
+    let mut decisions = Vec::new();
+    reserve(&mut decisions, all.len(), WHAT)?;
     // For each its number by size, and whether it faces inwards.
     let mut decided = filled((0u32, false), all.len(), WHAT)?;
     for (number, sums) in (0u32..).zip(&all) {
-        let (component, is_inwards) = sums.decide();
-        if components.largest.len() < TOLD {
-            components.largest.push(component);
-        }
+        let (decision, is_inwards) = sums.decide();
+        decisions.push(decision);
         decided[sums.number as usize] = (number, is_inwards);
     }
     for (flipped, component) in signs.flipped.iter_mut().zip(&mut signs.component) {
@@ -227,5 +254,5 @@ pub(super) fn decide(grid: &Grid, patches: &Patches, sights: &Sights, signs: &mu
         *flipped ^= is_inwards;
         *component = number;
     }
-    Ok(components)
+    Ok(decisions)
 }

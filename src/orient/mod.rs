@@ -2,11 +2,13 @@
 //!
 //! `docs/orientation.md` explains the rule, its sources and its limits. In short: the points of each small cube are parted
 //! into patches ([`patches`]), a patch and those round it say whether their signs agree ([`links`]), which sides of a patch
-//! are open to the air says which way is out ([`air`]), and the signs are chosen that these agree with best ([`groups`]).
+//! are open to the air says which way is out ([`air`]), and the signs are chosen that these agree with best ([`groups`]). What
+//! is open then faces what stands before it ([`facing`]).
 
 mod air;
 mod components;
 mod cubes;
+mod facing;
 mod groups;
 mod links;
 mod patches;
@@ -106,12 +108,16 @@ fn surfaces(
     let sights = air::sights(&grid, &patches, points.len(), &stage.part(0.5..0.55))?;
     let links = Links::of(&grid, &patches, noise, &stage.part(0.55..0.7))?;
     let groups = Groups::of(links, &sights, &patches, &stage.part(0.7..0.85))?;
-    let choice = stage.part(0.85..0.95);
+    let choice = stage.part(0.85..0.9);
     let mut signs = match options.orient {
         Orient::Outward => Signs::outward(groups, &choice)?,
         _ => Signs::consistent(groups, &sights, &choice)?,
     };
-    let components = decide(&grid, &patches, &sights, &mut signs)?;
+    let mut decisions = decide(&grid, &patches, &sights, &mut signs)?;
+    if options.orient == Orient::Consistent {
+        facing::face(&grid, &patches, &sights, &mut signs, &mut decisions, &stage.part(0.9..0.95))?;
+    }
+    let components = Components::of(&decisions)?;
     let of_point = turn(&grid, &patches, &members, &signs, normals, options.components, &stage.part(0.95..1.0))?;
     Ok(Surfaces { components, of_point })
 }

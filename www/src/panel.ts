@@ -197,6 +197,7 @@ type Largest = NonNullable<Report['components']>['largest'][number];
 const WAYS = {
   air: ['outwards', 'inwards'],
   volume: ['away from the middle', 'towards the middle'],
+  sight: ['towards what stands before it', 'away from what stands before it'],
 } as const;
 
 function facing({ side, confidence }: Largest, isTurned: boolean): HTMLElement {
