@@ -35,7 +35,7 @@ function tally() {
 /** Seconds for a million points that orientation may take, on one thread. */
 export const MOST_SECONDS = 0.15;
 
-/** What is asked of each kind of row. `part`: of which of its points. */
+/** What is asked of each kind of row. `part`: of which of its points; `modes`: of which modes, if not of all. */
 const ASKED = {
   'clean shapes': { least: 1 },
   'noisy shapes': { least: 0.995 },
@@ -44,11 +44,14 @@ const ASKED = {
   'meshes with noise 0.6 %, thin': { part: 'thin', least: 0.97 },
   'meshes, other noise and density': { least: 0.97 },
   'range scans': { least: 0.999 },
+  // Outwards is away from the scanner.
+  scenes: { modes: ['consistent'], least: 0.995 },
 };
 
 function kindsOf({ kind, variant, sides }) {
   if (!sides) return [];
   if (kind === 'ranges') return ['range scans'];
+  if (kind === 'scene') return ['scenes'];
   if (kind === 'shape') return [variant === 'clean' ? 'clean shapes' : 'noisy shapes'];
   if (variant === 'clean') return ['clean meshes'];
   if (variant === 'noise0.6') return ['meshes with noise 0.6 %, thick', 'meshes with noise 0.6 %, thin'];
@@ -64,8 +67,9 @@ export const counted = ({ open }, { share, eitherWay }) => (open ? eitherWay : s
  */
 export function verdicts(row) {
   return kindsOf(row).flatMap((kind) => {
-    const { part = 'all', least } = ASKED[kind];
-    return Object.entries(row.modes).flatMap(([mode, { signs }]) => {
+    const { part = 'all', modes = Object.keys(row.modes), least } = ASKED[kind];
+    return modes.flatMap((mode) => {
+      const { signs } = row.modes[mode];
       if (!(signs[part].points > 0)) return [];
       const share = counted(row, signs[part]);
       return [{ kind, least, mode, share, met: share >= least, clear: counted(row, signs[part].clear) >= least }];

@@ -66,9 +66,9 @@ export function plannedRows({ rows, points, meshVariants }, meshes, scans = []) 
   const shapes = Object.keys(SHAPES);
   return [
     ...rows.map(({ name, variant }) => {
-      const { shape, open = false, sides = true } = SHAPES[name];
+      const { shape, open = false, sides = true, kind = 'shape' } = SHAPES[name];
       const cloud = () => cloudOf(shape(points), points, VARIANTS[variant], 1 + shapes.indexOf(name));
-      return { name, variant, kind: 'shape', open, sides, cloud };
+      return { name, variant, kind, open, sides, cloud };
     }),
     ...meshes.flatMap(({ name, about, corners, sampler }) => {
       const walls = once(() => wallsOf(corners, cloudOf(sampler, points, {}, MESH_SEED)));

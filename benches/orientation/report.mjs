@@ -19,7 +19,7 @@ export function report(rows, { machine, minutes, hasFolder, skipped, notes }) {
   return `${paragraphs(
     '# Orientation, measured',
     "Signs by `orient: 'consistent'` and `'outward'` against true ones, on generated shapes, on points sampled on meshes, and on range scans. Written by `npm run orientation`, text and all; not to be edited.",
-    `${model}, ${cores} cores, Node ${node}, ${date}; took ${minutes.toFixed(1)} minutes. Shares are of the points with a true normal, and never rounded up; a point without a normal is not right. Normals must point outwards; those of an open surface, marked ○, either all to one side or all to the other. Clear: without the points whose normal is more than 60 degrees off the true one, either way; at sharp edges and in noise these have the normal of another face, and their sign says little. What is asked counts all points. Times are of WebAssembly in Node with one thread, in seconds for a million points, the fastest of ${RUNS} runs, or of fewer where these take more than ${ENOUGH / 1_000} seconds.`,
+    `${model}, ${cores} cores, Node ${node}, ${date}; took ${minutes.toFixed(1)} minutes. Shares are of the points with a true normal, and never rounded up; a point without a normal is not right. Normals must point outwards; those of an open surface, marked ○, either all to one side or all to the other. Scenes (scene, view) are what scanners see of a corner of a room with furniture in it (benches/orientation/scene.mjs): normals must face them. Clear: without the points whose normal is more than 60 degrees off the true one, either way; at sharp edges and in noise these have the normal of another face, and their sign says little. What is asked counts all points. Times are of WebAssembly in Node with one thread, in seconds for a million points, the fastest of ${RUNS} runs, or of fewer where these take more than ${ENOUGH / 1_000} seconds.`,
     `Noise is normally distributed, its standard deviation a share of the diagonal of the box; stripes and gradient are patterns of density (benches/accuracy/clouds.mjs). A wall is thick that is more than ${THICK} times the deviation of the noise, along the inward normal, or that has no other side.`,
     '## In short',
     overview(rows),
@@ -37,16 +37,19 @@ function overview(rows) {
   const all = rows.flatMap((row) => verdicts(row).map((verdict) => ({ ...verdict, row })));
   const kinds = [...new Set(all.map(({ kind }) => kind))];
   const signs = kinds.flatMap((kind) =>
-    MODES.map((mode) => {
+    MODES.flatMap((mode) => {
       const group = all.filter((verdict) => verdict.kind === kind && verdict.mode === mode);
+      if (group.length === 0) return [];
       const worst = least(group, ({ share }) => share);
       const met = group.filter(({ met }) => met).length;
       return [
-        `${kind}: ${mode}`,
-        asPercent(worst.least),
-        `${share(worst.share)} (${fullName(worst.row)})`,
-        `${met} of ${group.length}`,
-        verdict(met === group.length),
+        [
+          `${kind}: ${mode}`,
+          asPercent(worst.least),
+          `${share(worst.share)} (${fullName(worst.row)})`,
+          `${met} of ${group.length}`,
+          verdict(met === group.length),
+        ],
       ];
     }),
   );

@@ -123,8 +123,8 @@ const moebius = () => (random, out) => {
 };
 
 /**
- * `open`: no side of it is the inside, and signs count up to one flip of all. `sides: false`: it has none. `noise`: the
- * variant of its noisy row, 0.6 % but where that is too much for what is thin.
+ * `open`: no side of it is the inside, and signs count up to one flip of all. `sides: false`: it has none. `kind`: what it is,
+ * if not a shape. `noise`: the variant of its noisy row, 0.6 % but where that is too much for what is thin.
  */
 export const SHAPES = {
   sphere: { shape: KNOWN.sphere },
@@ -142,6 +142,6 @@ export const SHAPES = {
   moebius: { shape: moebius, open: true, sides: false },
   bracket: { shape: bracket, noise: 'noise0.12' },
   star: { shape: star, noise: 'noise0.12' },
-  scene: { shape: scene(3), noise: 'noise0.12' },
-  view: { shape: scene(1), noise: 'noise0.12' },
+  scene: { shape: scene(3), kind: 'scene', noise: 'noise0.12' },
+  view: { shape: scene(1), kind: 'scene', noise: 'noise0.12' },
 };
