@@ -62,11 +62,12 @@ pub enum Orient {
     /// Deterministic, and nothing more: `x + 2y + 4z >= 0` for every normal.
     #[default]
     None,
-    /// One sign for each connected surface: outwards if it is closed, otherwise away from its middle, and if it is flat
-    /// `x + 2y + 4z >= 0` for its mean normal. For anything; [`crate::Report::components`] tells how sure it is.
+    /// One sign for each connected surface: outwards if it is closed, else towards what stands before it; if nothing does, away
+    /// from its middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal. For anything; [`crate::Report::components`]
+    /// tells how sure it is.
     Consistent,
     /// The same for surfaces that are closed. Of others every part is turned to what it sees of the open, even if that makes an
-    /// edge of its own: for heaps of parts, and objects with holes.
+    /// edge of its own, and to nothing that stands before it: for heaps of parts, and objects with holes.
     Outward,
     /// Towards a position, in the coordinates of the input: for what was scanned from there.
     Viewpoint([f64; 3]),

@@ -414,6 +414,14 @@ fn an_open_surface_faces_what_stands_before_it() {
         let right = share_right(&result.normals, &cloud.normals);
         assert!(right > 0.999, "{name}: {right}, {:?}", components(&result));
         assert_eq!(components(&result)[0].side, Side::Sight, "{name}");
+        // So it does in a mirror.
+        let flip = |points: &[f32]| points.chunks_exact(3).flat_map(|p| [-p[0], p[1], p[2]]).collect::<Vec<f32>>();
+        let truth: Vec<[f64; 3]> = cloud.normals.iter().map(|n| [-n[0], n[1], n[2]]).collect();
+        let right = share_right(&orient(&flip(&cloud.points), Orient::Consistent).normals, &truth);
+        assert!(right > 0.999, "{name} in a mirror: {right}");
+        // Outwards is away from what stands before it, too.
+        let outward = orient(&cloud.points, Orient::Outward);
+        assert!(components(&outward).iter().all(|one| one.side != Side::Sight), "{name}");
     }
 }
 
@@ -442,6 +450,7 @@ fn ground_faces_what_stands_on_it() {
         let result = orient(&cloud.points, Orient::Consistent);
         let right = share_right(&result.normals, &cloud.normals);
         assert!(right > 0.999, "{height}: {right}, {:?}", components(&result)[0]);
+        assert_eq!(components(&result)[0].side, Side::Sight, "{height}");
     }
 }
 

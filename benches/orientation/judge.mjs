@@ -44,7 +44,7 @@ const ASKED = {
   'meshes with noise 0.6 %, thin': { part: 'thin', least: 0.97 },
   'meshes, other noise and density': { least: 0.97 },
   'range scans': { least: 0.999 },
-  // Outwards is away from the scanner.
+  // By 'outward' rooms face away from the scanner.
   scenes: { modes: ['consistent'], least: 0.995 },
 };
 

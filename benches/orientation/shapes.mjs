@@ -124,7 +124,8 @@ const moebius = () => (random, out) => {
 
 /**
  * `open`: no side of it is the inside, and signs count up to one flip of all. `sides: false`: it has none. `kind`: what it is,
- * if not a shape. `noise`: the variant of its noisy row, 0.6 % but where that is too much for what is thin.
+ * if not a shape. `noise`: the variant of its noisy row, 0.6 % but where that is too much for what is thin, or for a
+ * scanner.
  */
 export const SHAPES = {
   sphere: { shape: KNOWN.sphere },

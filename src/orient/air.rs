@@ -88,7 +88,7 @@ pub(super) fn sights(grid: &Grid, patches: &Patches, points: usize, stage: &Stag
 
 /// Whether in a direction another patch of the cube hides the open from one: its plane lies there. Else the two sides of a thin
 /// wall would both see what is before each, and the deep side of a blade's edge what is before the other.
-fn is_hidden(patch: &Patch, own: &[Patch], direction: IVec3) -> bool {
+pub(super) fn is_hidden(patch: &Patch, own: &[Patch], direction: IVec3) -> bool {
     own.iter().any(|other| {
         let apart = other.normal.dot(other.centre - patch.centre);
         apart * other.normal.dot(direction.as_vec3()) > 0.0

@@ -72,7 +72,7 @@ impl Side {
 pub(super) struct Decision {
     pub component: Component,
     pub patches: u64,
-    /// Of that of a sphere, or of its pieces.
+    /// How much volume it holds, on either side, of that of a sphere, or of its pieces; 0 if it is flat.
     pub volume: f64,
 }
 

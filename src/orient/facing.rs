@@ -1,6 +1,6 @@
 //! Which way open surfaces face: towards what stands before them.
 
-use super::air::Sights;
+use super::air::{Sights, is_hidden};
 use super::components::{Decision, Side};
 use super::patches::{Patches, signed};
 use super::signs::Signs;
@@ -19,15 +19,15 @@ const WHAT: &str = "the facing of surfaces";
 /// objects have, ground and walls do not.
 const IN_THE_OPEN: f32 = 0.5;
 
-/// Less of the open is a gap, and what sees no less of it sees nothing else: about 0.68 is all on one side.
-const LEAST_SIGHT: f32 = 0.05;
-const MOST_SIGHT: f32 = 0.66;
+/// Less of the open is a gap, and what sees so much of it has next to nothing else before it: all on one side is 0.67 to 0.74.
+const LEAST_OPEN: f32 = 0.05;
+const MOST_OPEN: f32 = 0.66;
 
-/// Patches that look out at a time: enough to tell every larger surface, and the time does not grow with the points.
+/// Patches that look out in a round at the most: enough to tell every larger surface, and the rays do not grow with the points.
 const LOOKERS: usize = 4096;
 
-/// How far they look, in cubes.
-const REACH: i32 = 256;
+/// How far they look, in steps from cube to cube.
+const REACH: i32 = 1024;
 
 /// They look in directions that are at most 72 degrees from their normal, by its cosine.
 const AHEAD: f32 = 0.3;
@@ -35,9 +35,10 @@ const AHEAD: f32 = 0.3;
 /// Surfaces of fewer patches are not worth the time.
 const LEAST_PATCHES: u64 = 32;
 
-/// A surface is told by looks, each of them a ray that hits it head-on, if their difference squared is so many times their sum: by
-/// sixteen at one side, by a hundred at one and fifty at the other. Fewer are chance: roofs seen from each other look under the
-/// edge that their missing walls leave. The largest surface is what the others stand on or before, so fewer tell.
+/// A surface is told by looks, each as much as a ray that hits it head-on, if the square of their balance is so many times
+/// their sum: by more than sixteen at one side, by a hundred at one and fifty at the other. With twelve, roofs that look at each
+/// other under the edge that their missing walls leave turn some of them. The largest surface is what the others stand on or
+/// before, so fewer tell.
 const SURE: f64 = 16.0;
 const SURE_OF_LARGEST: f64 = 5.0;
 
@@ -48,31 +49,32 @@ const ONE_SIDED: f64 = 0.2;
 /// ball has 0.7, and its rim looks at its hollow side.
 const HOLLOW: f64 = 0.5;
 
-/// What holds less is flat: it may be told by what was told before. Else what looks may see it from behind, through what the
-/// scanner did not see.
+/// What holds less is flat: only that is told by what was told before. Boxes of which two walls are missing have 0.3, and are
+/// looked at from behind through the gap.
 const FLAT: f64 = 0.1;
 
-/// What all looks at one side of is no surer than this: also the parts of a surface with one side look at each other.
+/// The confidence where every look is at one side: no more, as also the parts of a surface with one side look at each other.
 const MOST_CONFIDENCE: f64 = 0.5;
 
-/// How often what was turned last looks out in its turn.
+/// Rounds at the most: in each, what was told in the one before looks out.
 const ROUNDS: usize = 8;
 
-/// How often a surface is looked at.
+/// How much a surface is looked at.
 #[derive(Clone, Copy, Default)]
 struct Looks {
-    /// From the side that its normals point to, less from the other.
-    front: f64,
+    /// At the side that its normals point to, less at the other.
+    balance: f64,
     all: f64,
 }
 
 /// Turns the surfaces that are not closed to face what looks at them.
 ///
-/// Where the open side of an object looks at a wall, nothing stands between the two: there the scanner was, not behind the wall,
-/// which so faces the object. First look the patches that are in the open, of surfaces that agree with them; then, at flat surfaces,
-/// all those that were told just before. Along a line of sight what faces it and what does not alternates (Takayama and others,
-/// 2014); here in 26 directions, and for surfaces, not for facets. Takes a few milliseconds a round, for any number of points.
-pub(super) fn face(
+/// Where the open side of an object looks at a wall, nothing stands between the two: there the scanner was, not behind the
+/// wall, which so faces the object. First look the patches that are in the open, of surfaces that agree with them; then, at
+/// flat surfaces, all those that were told just before. Along a line of sight what faces it and what does not alternates
+/// (Takayama and others, 2014); here in 26 directions, and for surfaces, not for facets. Each round is some passes over the
+/// patches and at most some fifty thousand rays.
+pub(super) fn turn_to_what_looks(
     grid: &Grid,
     patches: &Patches,
     sights: &Sights,
@@ -80,58 +82,60 @@ pub(super) fn face(
     decisions: &mut [Decision],
     stage: &Stage,
 ) -> Result<(), Error> {
+    // Nothing else looks at what is alone.
     let is_alone = decisions.len() == 1;
-    let mut is_told = filled(false, decisions.len(), WHAT)?;
-    for (is_told, decision) in is_told.iter_mut().zip(&*decisions) {
+    // Told, or not to be.
+    let mut is_settled = filled(false, decisions.len(), WHAT)?;
+    for (is_settled, decision) in is_settled.iter_mut().zip(&*decisions) {
         let is_closed = decision.component.side == Side::Air;
-        *is_told = is_closed || decision.patches < LEAST_PATCHES || is_alone && decision.volume >= HOLLOW;
+        *is_settled = is_closed || decision.patches < LEAST_PATCHES || is_alone && decision.volume >= HOLLOW;
     }
-    if !is_told.contains(&false) {
+    if !is_settled.contains(&false) {
         return Ok(());
     }
     let component = |signs: &Signs, patch: usize| signs.component[patch] as usize;
 
     let open_side = |patch: usize| {
         let (exposure, all) = (sights.exposure[patch], sights.all[patch]);
-        let looks = all > LEAST_SIGHT && exposure.abs() > IN_THE_OPEN * all && exposure.abs() < MOST_SIGHT;
-        looks.then_some(exposure < 0.0)
+        let is_looker = all > LEAST_OPEN && exposure.abs() > IN_THE_OPEN * all && exposure.abs() < MOST_OPEN;
+        is_looker.then_some(exposure < 0.0)
     };
     let counts = |patch: usize, is_flipped: bool, other: usize| match component(signs, other) {
         own if own == component(signs, patch) => decisions[own].volume < HOLLOW,
         _ => is_flipped == signs.flipped[patch],
     };
-    let looks = look(grid, patches, signs, &is_told, &open_side, &counts)?;
-    let mut fresh = turn(looks, signs, decisions, &mut is_told)?;
+    let looks = look(grid, patches, signs, &is_settled, &open_side, &counts)?;
+    let mut fresh = tell(looks, signs, decisions, &mut is_settled)?;
 
-    for (is_told, decision) in is_told.iter_mut().zip(&*decisions) {
-        *is_told |= decision.volume >= FLAT;
+    for (is_settled, decision) in is_settled.iter_mut().zip(&*decisions) {
+        *is_settled |= decision.volume >= FLAT;
     }
     for round in 1..ROUNDS {
-        if !fresh.contains(&true) || !is_told.contains(&false) {
+        if !fresh.contains(&true) || !is_settled.contains(&false) {
             break;
         }
         stage.tell(round as f64 / ROUNDS as f64)?;
-        let front = |patch: usize| fresh[component(signs, patch)].then_some(signs.flipped[patch]);
-        let looks = look(grid, patches, signs, &is_told, &front, &|_, _, _| true)?;
-        fresh = turn(looks, signs, decisions, &mut is_told)?;
+        let front_side = |patch: usize| fresh[component(signs, patch)].then_some(signs.flipped[patch]);
+        let looks = look(grid, patches, signs, &is_settled, &front_side, &|_, _, _| true)?;
+        fresh = tell(looks, signs, decisions, &mut is_settled)?;
     }
     Ok(())
 }
 
 /// Turns the surfaces that are looked at from behind, and answers which were told, those included.
-fn turn(
+fn tell(
     looks: Vec<Looks>,
     signs: &mut Signs,
     decisions: &mut [Decision],
-    is_told: &mut [bool],
+    is_settled: &mut [bool],
 ) -> Result<Vec<bool>, Error> {
     let (mut fresh, mut is_turned) = (filled(false, looks.len(), WHAT)?, filled(false, looks.len(), WHAT)?);
-    for (i, Looks { front, all }) in looks.into_iter().enumerate() {
+    for (i, Looks { balance, all }) in looks.into_iter().enumerate() {
         let sure = if i == 0 { SURE_OF_LARGEST } else { SURE };
-        if front * front > sure * all && front.abs() > ONE_SIDED * all {
-            (is_told[i], fresh[i], is_turned[i]) = (true, true, front < 0.0);
+        if balance * balance > sure * all && balance.abs() > ONE_SIDED * all {
+            (is_settled[i], fresh[i], is_turned[i]) = (true, true, balance < 0.0);
             let component = &mut decisions[i].component;
-            (component.side, component.confidence) = (Side::Sight, MOST_CONFIDENCE * front.abs() / all);
+            (component.side, component.confidence) = (Side::Sight, MOST_CONFIDENCE * balance.abs() / all);
         }
     }
     for (flipped, &component) in signs.flipped.iter_mut().zip(&signs.component) {
@@ -140,44 +144,46 @@ fn turn(
     Ok(fresh)
 }
 
-/// How often each surface that is not told yet is looked at. `front` answers for patches that look out whether they do so
-/// against their normal; `counts(patch, against its normal, other)` whether what it sees of another tells anything.
+/// How much each surface that is not settled is looked at. `side` answers for patches that look out whether they do so against
+/// their normal; `counts(patch, against its normal, other)` whether what it sees of another tells anything.
 fn look(
     grid: &Grid,
     patches: &Patches,
     signs: &Signs,
-    is_told: &[bool],
-    front: &dyn Fn(usize) -> Option<bool>,
+    is_settled: &[bool],
+    side: &dyn Fn(usize) -> Option<bool>,
     counts: &dyn Fn(usize, bool, usize) -> bool,
 ) -> Result<Vec<Looks>, Error> {
-    let mut looks = filled(Looks::default(), is_told.len(), WHAT)?;
-    let sight = Sight::of(grid);
-    let step = (0..patches.all.len()).filter(|&patch| front(patch).is_some()).count().div_ceil(LOOKERS);
+    let mut looks = filled(Looks::default(), is_settled.len(), WHAT)?;
+    let rays = Rays::through(grid);
+    let step = (0..patches.all.len()).filter(|&patch| side(patch).is_some()).count().div_ceil(LOOKERS);
     let mut lookers = 0;
     for (brick, cube, bit) in (0..grid.blocks.len()).flat_map(|block| grid.cubes_in(block)) {
         let place = BRICK * grid.bricks.places[brick] + cube_place(bit);
         for patch in patches.of_cube(cube) {
-            let Some(is_flipped) = front(patch) else { continue };
+            let Some(is_flipped) = side(patch) else { continue };
             lookers += 1;
             if lookers % step != 0 {
                 continue;
             }
-            let ahead = signed(is_flipped, patches.all[patch].normal);
+            let (looker, beside) = (&patches.all[patch], &patches.all[patches.of_cube(cube)]);
             for direction in STEPS {
                 let ray = direction.as_vec3().normalize_or_zero();
-                if ray.dot(ahead) < AHEAD {
+                if ray.dot(signed(is_flipped, looker.normal)) < AHEAD || is_hidden(looker, beside, direction) {
                     continue;
                 }
-                let Some(hit) = sight.first(place, direction) else { continue };
+                let Some(hit) = rays.first(place, direction) else { continue };
                 for other in patches.of_cube(hit) {
-                    let component = signs.component[other] as usize;
-                    if !is_told[component] && counts(patch, is_flipped, other) {
-                        let Looks { front, all } = &mut looks[component];
-                        let normal = signed(signs.flipped[other], patches.all[other].normal);
-                        let seen = f64::from(-normal.dot(ray) * patches.all[other].certainty());
-                        *front += seen;
-                        *all += seen.abs();
+                    let (seen, component) = (&patches.all[other], signs.component[other] as usize);
+                    if is_settled[component]
+                        || !counts(patch, is_flipped, other)
+                        || is_hidden(seen, &patches.all[patches.of_cube(hit)], -direction)
+                    {
+                        continue;
                     }
+                    let along = -signed(signs.flipped[other], seen.normal).dot(ray) * seen.certainty();
+                    looks[component].balance += f64::from(along);
+                    looks[component].all += f64::from(along.abs());
                 }
             }
         }
@@ -186,14 +192,14 @@ fn look(
 }
 
 /// The occupied cubes, and the box round them.
-struct Sight<'a> {
+struct Rays<'a> {
     grid: &'a Grid,
     low: IVec3,
     high: IVec3,
 }
 
-impl<'a> Sight<'a> {
-    fn of(grid: &'a Grid) -> Self {
+impl<'a> Rays<'a> {
+    fn through(grid: &'a Grid) -> Self {
         let places = &grid.bricks.places;
         let low = places.iter().fold(IVec3::MAX, |low, &place| low.min(place));
         let high = places.iter().fold(IVec3::MIN, |high, &place| high.max(place));
@@ -236,7 +242,7 @@ mod tests {
     use crate::source::Source;
     use glam::DVec3;
 
-    /// In a box of 60 cubes with one in a hundred occupied, so that most bricks are empty.
+    /// In a box of 60 cubes with one in a hundred occupied, so that every other brick is empty.
     #[test]
     fn what_is_seen_first_is_what_steps_one_by_one_meet() {
         const SIDE: u32 = 60;
@@ -255,7 +261,7 @@ mod tests {
         let stage = Progress::silent();
         let stage = stage.stage("test", 0.0..1.0);
         let (grid, _) = Grid::sort(&Source::new(&points, lattice), &stage, |_, _| ()).unwrap();
-        let sight = Sight::of(&grid);
+        let rays = Rays::through(&grid);
         let cube_at = |place: IVec3| {
             let brick = place.div_euclid(IVec3::splat(BRICK));
             let number = grid.bricks.number(brick)? as usize;
@@ -268,7 +274,7 @@ mod tests {
                 let mut along = (1..SIDE as i32).map(|distance| from + distance * direction);
                 let beside = cube_at(from + direction).is_some();
                 let expected = along.find_map(cube_at).filter(|_| !beside);
-                assert_eq!(sight.first(from, direction), expected, "{from} {direction}");
+                assert_eq!(rays.first(from, direction), expected, "{from} {direction}");
                 seen += usize::from(expected.is_some());
             }
         }

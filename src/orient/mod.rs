@@ -92,7 +92,7 @@ fn face(normals: &mut [Vec3], towards: &(dyn Fn(usize) -> DVec3 + Sync), stage: 
     })
 }
 
-/// One sign for each surface, outwards.
+/// One sign for each surface, outwards, or towards what stands before it.
 fn surfaces(
     points: &Points,
     normals: &mut [Vec3],
@@ -115,7 +115,7 @@ fn surfaces(
     };
     let mut decisions = decide(&grid, &patches, &sights, &mut signs)?;
     if options.orient == Orient::Consistent {
-        facing::face(&grid, &patches, &sights, &mut signs, &mut decisions, &stage.part(0.9..0.95))?;
+        facing::turn_to_what_looks(&grid, &patches, &sights, &mut signs, &mut decisions, &stage.part(0.9..0.95))?;
     }
     let components = Components::of(&decisions)?;
     let of_point = turn(&grid, &patches, &members, &signs, normals, options.components, &stage.part(0.95..1.0))?;
