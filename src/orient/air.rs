@@ -86,8 +86,8 @@ pub(super) fn sights(grid: &Grid, patches: &Patches, points: usize, stage: &Stag
     Ok(sights)
 }
 
-/// Whether in a direction another patch of the cube hides the open from one: its plane lies there. Else the two sides of a thin
-/// wall would both see what is before each, and the deep side of a blade's edge what is before the other.
+/// Whether in a direction another patch of the cube hides from one what lies beyond: its plane lies there. Else the two sides
+/// of a thin wall would both see what is before each, and the deep side of a blade's edge what is before the other.
 pub(super) fn is_hidden(patch: &Patch, own: &[Patch], direction: IVec3) -> bool {
     own.iter().any(|other| {
         let apart = other.normal.dot(other.centre - patch.centre);

@@ -42,7 +42,8 @@ const LEAST_PATCHES: u64 = 32;
 const SURE: f64 = 16.0;
 const SURE_OF_LARGEST: f64 = 5.0;
 
-/// Less than this share of all is chance however many they are: shadows let looks through to the wrong side.
+/// Where the balance is less than this share of all, nothing is told however many look: shadows let looks through to the wrong
+/// side.
 const ONE_SIDED: f64 = 0.2;
 
 /// What holds less volume is so open that its parts tell of each other, as what stands on the ground does of that. A half of a
