@@ -425,6 +425,34 @@ fn an_open_surface_faces_what_stands_before_it() {
     }
 }
 
+/// A part of a pipe, and bodies of which only the front was seen, see their own hollow side, which nothing stands before.
+#[test]
+fn what_is_hollow_does_not_face_itself() {
+    for angle in [0.5, 0.8, 1.1, 1.4] {
+        let mut random = Random(61);
+        let pipe = Cloud::of((0..40_000).map(|_| {
+            let (a, along) = (angle * random.signed(), 3.0 * random.unit());
+            (turn([a.sin(), a.cos(), along]), turn([a.sin(), a.cos(), 0.0]))
+        }));
+        let bodies = [([0.0, 0.0], 0.5), ([0.45, 0.3], 0.35), ([-0.5, 0.2], 0.3), ([0.1, -0.55], 0.3)];
+        let height = |[x, y]: [f64; 2], ([a, b], radius): ([f64; 2], f64)| {
+            (radius * radius - (x - a).powi(2) - (y - b).powi(2)).max(0.0).sqrt()
+        };
+        let seen = (0..80_000).filter_map(|_| {
+            let place = [random.signed(), random.signed()];
+            let front = bodies.into_iter().max_by(|&a, &b| height(place, a).total_cmp(&height(place, b)))?;
+            let ([x, y], ([a, b], radius), z) = (place, front, height(place, front));
+            let normal = [x - a, y - b, z].map(|c| c / radius);
+            // What is seen at a slant has few points.
+            (normal[2] > angle.cos()).then(|| (turn([x, y, z]), turn(normal)))
+        });
+        for (name, cloud) in [("pipe", pipe), ("bodies", Cloud::of(seen))] {
+            let right = share_right(&orient(&cloud.points, Orient::Consistent).normals, &cloud.normals);
+            assert!(right > 0.99, "{name}, {angle}: {right}");
+        }
+    }
+}
+
 /// What stands on it is one surface with it, and neither its volume nor the convention says which side is up.
 #[test]
 fn ground_faces_what_stands_on_it() {
