@@ -23,8 +23,19 @@ pub(super) struct Level {
     /// For each cube its last sample, plus one.
     sample_end: Vec<u32>,
     pub surfaces: Vec<Surface>,
-    /// The cubes whose points are to get their normals here; if empty, all.
-    wanted: Vec<bool>,
+    /// What each cube is here for; if empty, all are wanted.
+    roles: Vec<Role>,
+}
+
+/// What a cube is here for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Role {
+    /// Its points are to get their normals here.
+    Wanted,
+    /// Cubes near it ask for its surface.
+    Near,
+    /// The same, but it is part of a cube where all agree that rests on more than its smallest neighbourhood: so this does too.
+    Settled,
 }
 
 /// The sums of a cube's own samples count whole in its surface, those of a cube beyond its side this much, beyond an edge
@@ -46,8 +57,8 @@ impl Level {
             total += *end;
             *end = total;
         }
-        let (samples, surfaces, wanted) = (Samples::default(), Vec::new(), Vec::new());
-        Ok(Self { lattice: source.lattice, grid, samples, sample_end, surfaces, wanted })
+        let (samples, surfaces, roles) = (Samples::default(), Vec::new(), Vec::new());
+        Ok(Self { lattice: source.lattice, grid, samples, sample_end, surfaces, roles })
     }
 
     /// Makes the samples. `wholes` says what each point stands for, if not for itself: in edges half as long.
@@ -99,12 +110,13 @@ impl Level {
         Ok(level)
     }
 
-    /// Cubes of half the edge, with their surfaces, for the points in and round those of a batch that are rough.
+    /// Cubes of half the edge, with their surfaces, for the points in and round those of a batch whose parts are wanted.
+    /// `parts` has the role of the parts of each cube.
     #[optimize(size)]
     #[inline(never)]
-    pub fn divided(&self, rough: &[bool], batch: Range<usize>, stage: &Stage) -> Result<Self, Error> {
+    pub fn divided(&self, parts: &[Role], batch: Range<usize>, stage: &Stage) -> Result<Self, Error> {
         let grid = &self.grid;
-        let is_divided = |cube: usize| rough[cube] && batch.contains(&cube);
+        let is_divided = |cube: usize| parts[cube] == Role::Wanted && batch.contains(&cube);
         let mut is_near: Vec<AtomicBool> = Vec::new();
         reserve(&mut is_near, grid.cubes(), "the cubes")?;
         is_near.resize_with(grid.cubes(), AtomicBool::default);
@@ -158,17 +170,21 @@ impl Level {
         let mut level = Self::new(&source, &stage.part(0.2..0.45))?;
         drop((positions, numbers, ends));
         level.sample(None, &stage.part(0.45..0.5))?;
-        level.fit(&stage.part(0.5..0.9))?;
-        level.release_samples();
-        let wanted = Filling::new(level.grid.cubes(), "the cubes")?;
-        level.grid.each_cube(&stage.part(0.9..1.0), &|brick, cube, bit| {
+        let roles = Filling::new(level.grid.cubes(), "the cubes")?;
+        level.grid.each_cube(&stage.part(0.5..0.55), &|brick, cube, bit| {
             // In whole numbers: a point must get its normal once.
             let whole = self.number(level.place(brick, bit) >> 1);
+            let role = whole.map_or(Role::Near, |whole| match parts[whole] {
+                Role::Wanted if !is_divided(whole) => Role::Near,
+                role => role,
+            });
             // SAFETY: once for each cube.
-            unsafe { wanted.write(cube, whole.is_some_and(is_divided)) };
+            unsafe { roles.write(cube, role) };
         })?;
         // SAFETY: these were all cubes.
-        level.wanted = unsafe { wanted.complete() };
+        level.roles = unsafe { roles.complete() };
+        level.fit(&stage.part(0.55..1.0))?;
+        level.release_samples();
         Ok(level)
     }
 
@@ -182,9 +198,9 @@ impl Level {
         (self.samples, self.sample_end) = (Samples::default(), Vec::new());
     }
 
-    /// Whether the points of a cube are to get their normals here.
-    pub fn is_wanted(&self, cube: usize) -> bool {
-        self.wanted.get(cube).is_none_or(|&is_wanted| is_wanted)
+    /// What a cube is here for.
+    pub fn role(&self, cube: usize) -> Role {
+        self.roles.get(cube).copied().unwrap_or(Role::Wanted)
     }
 
     /// The points of a cube.
@@ -211,7 +227,7 @@ impl Level {
         (self.grid.masks[brick] >> bit & 1 == 1).then(|| self.grid.cube(brick, bit) as usize)
     }
 
-    /// Finds the surface of every cube, through the samples in it and the 26 round it.
+    /// Finds the surface of every cube that does not have one, through the samples in it and the 26 round it.
     #[inline(never)]
     pub fn fit(&mut self, stage: &Stage) -> Result<(), Error> {
         let grid = &self.grid;
@@ -219,11 +235,13 @@ impl Level {
         stage.run(grid.blocks.len(), &|block| {
             let (mut around, mut near, mut window) = (Around::new(), Vec::new(), Window::new());
             for (brick, cube, bit) in grid.cubes_in(block) {
-                around.near(grid, brick, bit, 1, &mut near);
                 window.clear();
-                for &(step, near) in &near {
-                    let shares = 1.0 - (1.0 - NEXT) * step.abs();
-                    window.add(&self.samples, range(&self.sample_end, near), step, shares.element_product());
+                if self.role(cube) != Role::Settled {
+                    around.near(grid, brick, bit, 1, &mut near);
+                    for &(step, near) in &near {
+                        let shares = 1.0 - (1.0 - NEXT) * step.abs();
+                        window.add(&self.samples, range(&self.sample_end, near), step, shares.element_product());
+                    }
                 }
                 // SAFETY: once for each cube.
                 unsafe { surfaces.write(cube, window.fit()) };

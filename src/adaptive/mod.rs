@@ -22,7 +22,7 @@ use crate::points::Points;
 use crate::progress::{Progress, Stage};
 use crate::source::Source;
 use choose::{Chosen, choose};
-use level::Level;
+use level::{Level, Role};
 use std::ops::Range;
 use tally::Tally;
 use vote::Vote;
@@ -95,10 +95,10 @@ pub(crate) fn normals(
     let chosen = choose(&levels, &stage.part(0.0..0.4))?;
     let tally = Tally::new();
     let mut run = Run { batch: BATCH.max(count / 8), normals: &normals, tally: &tally, cubes: 0, surfaces: 0 };
-    let rough = run.settle(&levels, &chosen, 0, &stage.part(0.4..1.0))?;
+    let parts = run.settle(&levels, &chosen, 0, &stage.part(0.4..1.0))?;
     drop(chosen);
     lap("vote");
-    run.divide(&mut levels, 0, &rough, &progress.stage("detail", 0.6..1.0))?;
+    run.divide(&mut levels, &parts, 0, &progress.stage("detail", 0.6..1.0))?;
     progress.update("detail", 1.0)?;
     lap("detail");
     let Run { cubes, surfaces, .. } = run;
@@ -119,7 +119,7 @@ struct Run<'a> {
 
 impl Run<'_> {
     /// Finds the normals of all points in the smallest cubes, the last of the levels, but not in those that are to be
-    /// divided: answers which are.
+    /// divided: answers what the parts of each cube are for, and only those of the divided ones are wanted.
     #[optimize(size)]
     fn settle(
         &mut self,
@@ -127,27 +127,28 @@ impl Run<'_> {
         chosen: &[Chosen],
         division: usize,
         stage: &Stage,
-    ) -> Result<Vec<bool>, Error> {
+    ) -> Result<Vec<Role>, Error> {
         let level = &levels[levels.len() - 1];
         let vote = Vote { level, chosen, division, normals: self.normals, tally: self.tally };
-        let rough = vote.run(stage)?;
-        for (_, chosen) in chosen.iter().enumerate().filter(|&(cube, _)| level.is_wanted(cube) && !rough[cube]) {
+        let parts = vote.run(stage)?;
+        let is_settled = |cube: usize| level.role(cube) == Role::Wanted && parts[cube] != Role::Wanted;
+        for (_, chosen) in chosen.iter().enumerate().filter(|&(cube, _)| is_settled(cube)) {
             self.cubes += 1;
             self.surfaces += u64::from(chosen.is_some());
         }
-        Ok(rough)
+        Ok(parts)
     }
 
-    /// Divides the rough ones of the smallest cubes, some at a time, so that a cloud that is rough everywhere takes hardly
-    /// more memory than another.
+    /// Divides those of the smallest cubes whose parts are wanted, some at a time, so that a cloud that is rough everywhere
+    /// takes hardly more memory than another.
     #[optimize(size)]
-    fn divide(&mut self, levels: &mut Vec<Level>, division: usize, rough: &[bool], stage: &Stage) -> Result<(), Error> {
+    fn divide(&mut self, levels: &mut Vec<Level>, parts: &[Role], division: usize, stage: &Stage) -> Result<(), Error> {
         let last = levels.len() - 1;
         let mut batches = Vec::new();
         let (mut start, mut points) = (0, 0);
-        for end in 1..=rough.len() {
-            points += if rough[end - 1] { levels[last].points(end - 1).len() } else { 0 };
-            if points >= self.batch || end == rough.len() && points > 0 {
+        for end in 1..=parts.len() {
+            points += if parts[end - 1] == Role::Wanted { levels[last].points(end - 1).len() } else { 0 };
+            if points >= self.batch || end == parts.len() && points > 0 {
                 grow(&mut batches, 1, "the cubes")?;
                 batches.push((points, start..end));
                 (start, points) = (end, 0);
@@ -163,15 +164,15 @@ impl Run<'_> {
         for (i, (points, batch)) in batches.into_iter().enumerate() {
             let stage = stage.part(done as f64 / total as f64..(done + points) as f64 / total as f64);
             done += points;
-            let finer = levels[last].divided(rough, batch, &stage.part(0.0..0.3))?;
+            let finer = levels[last].divided(parts, batch, &stage.part(0.0..0.3))?;
             if i + 1 == count {
                 levels[last].release_points();
             }
             levels.push(finer);
             let chosen = choose(levels, &stage.part(0.3..0.4))?;
-            let rough = self.settle(levels, &chosen, division + 1, &stage.part(0.4..0.5))?;
+            let parts = self.settle(levels, &chosen, division + 1, &stage.part(0.4..0.5))?;
             drop(chosen);
-            self.divide(levels, division + 1, &rough, &stage.part(0.5..1.0))?;
+            self.divide(levels, &parts, division + 1, &stage.part(0.5..1.0))?;
             levels.pop();
         }
         Ok(())

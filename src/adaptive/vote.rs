@@ -3,7 +3,7 @@
 use super::DIVISIONS;
 use super::around::Around;
 use super::choose::{Chosen, MISFIT};
-use super::level::Level;
+use super::level::{Level, Role};
 use super::matrix::{dot_lanes, times_lanes};
 use super::surface::Surface;
 use super::tally::Tally;
@@ -40,7 +40,8 @@ const DISTANCE_FLOOR: f32 = 9e-8;
 /// Where all normals round a cube agree within so many radians, and the sum of their deviations, nothing needs a vote.
 const SMOOTH: f32 = 0.05;
 
-/// So many where noise decides: then the normals differ because of it, but no more than on one surface.
+/// So many where noise decides: then the normals differ because of it, but no more than on one surface. And where the smallest
+/// neighbourhood knows its normal so well, the cube need not be divided to learn that it is noise.
 const SMOOTH_IN_NOISE: f32 = 0.12;
 
 /// Cubes whose surface rests on fewer points are not divided: the surfaces of the halves would rest on a quarter of them.
@@ -68,21 +69,26 @@ pub(super) struct Vote<'a> {
 
 impl Vote<'_> {
     /// Finds the normals of the points in the wanted cubes of the level, but not in those that are to be divided: answers
-    /// which are.
+    /// what the parts of each cube would be for.
+    #[optimize(size)]
     #[inline(never)]
-    pub fn run(&self, stage: &Stage) -> Result<Vec<bool>, Error> {
+    pub fn run(&self, stage: &Stage) -> Result<Vec<Role>, Error> {
         let level = self.level;
-        let rough = Filling::new(level.grid.cubes(), "the cubes")?;
+        let parts = Filling::new(level.grid.cubes(), "the cubes")?;
         stage.run(level.grid.blocks.len(), &|block| {
             let mut task = Task::new(self);
             for (brick, cube, bit) in level.grid.cubes_in(block) {
+                let role = match level.role(cube) {
+                    Role::Wanted => task.settle(brick, cube, bit),
+                    role => role,
+                };
                 // SAFETY: once for each cube.
-                unsafe { rough.write(cube, level.is_wanted(cube) && !task.settle(brick, cube, bit)) };
+                unsafe { parts.write(cube, role) };
             }
             self.normals.add_resolved(task.resolved);
         })?;
         // SAFETY: these were all cubes.
-        Ok(unsafe { rough.complete() })
+        Ok(unsafe { parts.complete() })
     }
 }
 
@@ -102,13 +108,13 @@ impl<'a> Task<'a> {
         Self { vote, writer, around: Around::new(), near: Vec::new(), ballot: Ballot::default(), resolved: 0 }
     }
 
-    /// Finds the normals of the points of a cube, unless it is to be divided: answers whether it was settled.
+    /// Finds the normals of the points of a cube, unless it is to be divided: then its parts are wanted.
     #[optimize(size)]
     #[inline(never)]
-    fn settle(&mut self, brick: usize, cube: usize, bit: u32) -> bool {
+    fn settle(&mut self, brick: usize, cube: usize, bit: u32) -> Role {
         let Vote { level, chosen, division, .. } = *self.vote;
         let (own, surface) = (&chosen[cube], &level.surfaces[cube]);
-        let can_divide = division < DIVISIONS && surface.points >= DIVIDED_POINTS;
+        let mut can_divide = division < DIVISIONS && surface.points >= DIVIDED_POINTS;
         let mut smooth = None;
         if own.is_some() {
             self.around.near(&level.grid, brick, bit, 1, &mut self.near);
@@ -118,11 +124,12 @@ impl<'a> Task<'a> {
                 self.ballot.invite(&self.near, chosen, f32::INFINITY);
                 let tolerance = if is_noisy { SMOOTH_IN_NOISE } else { SMOOTH };
                 smooth = self.ballot.smooth(own.quadric.centre, tolerance);
+                can_divide &= !(is_noisy && surface.error <= SMOOTH_IN_NOISE * SMOOTH_IN_NOISE);
             }
         }
         if smooth.is_none() {
             if can_divide {
-                return false;
+                return Role::Wanted;
             }
             self.around.near(&level.grid, brick, bit, 2, &mut self.near);
             let noises = self.near.iter().map(|(_, cube)| chosen[*cube].flat_noise);
@@ -155,7 +162,7 @@ impl<'a> Task<'a> {
         if own.is_some() {
             self.vote.tally.add(division, own, count);
         }
-        true
+        if smooth.is_some() && own.doublings > 0 { Role::Settled } else { Role::Near }
     }
 
     /// Whether noise decides in a cube: it and three quarters of the cubes near it rest on larger neighbourhoods than the
