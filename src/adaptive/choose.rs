@@ -1,8 +1,8 @@
 //! How large a neighbourhood each cube is to rest on.
 
-use super::SIZES;
 use super::level::Level;
 use super::surface::Quadric;
+use super::{SIZES, WHAT};
 use crate::error::Error;
 use crate::parallel::Filling;
 use crate::progress::Stage;
@@ -72,7 +72,7 @@ const SAME: f32 = 1e-5;
 #[inline(never)]
 pub(super) fn choose(levels: &[Level], stage: &Stage) -> Result<Vec<Chosen>, Error> {
     let smallest = &levels[levels.len() - 1];
-    let chosen = Filling::new(smallest.grid.cubes(), "the surfaces")?;
+    let chosen = Filling::new(smallest.grid.cubes(), WHAT)?;
     smallest.grid.each_cube(stage, &|brick, cube, bit| {
         let place = smallest.place(brick, bit);
         // SAFETY: once for each cube.

@@ -1,5 +1,6 @@
 //! A grid of cubes, and the surface of every cube.
 
+use super::WHAT;
 use super::around::Around;
 use super::samples::{Sample, Samples, Window, Writing};
 use super::surface::Surface;
@@ -41,9 +42,6 @@ pub(super) enum Role {
 /// The sums of a cube's own samples count whole in its surface, those of a cube beyond its side this much, beyond an edge
 /// the square of it, beyond a corner the cube.
 const NEXT: f32 = 0.7;
-
-/// What errors call the memory of the points on their way into a level.
-const WHAT: &str = "the detail";
 
 impl Level {
     /// Sorts the points, and counts the samples of each cube: the points of an octant are one.
@@ -118,7 +116,7 @@ impl Level {
         let grid = &self.grid;
         let is_divided = |cube: usize| parts[cube] == Role::Wanted && batch.contains(&cube);
         let mut is_near: Vec<AtomicBool> = Vec::new();
-        reserve(&mut is_near, grid.cubes(), "the cubes")?;
+        reserve(&mut is_near, grid.cubes(), WHAT)?;
         is_near.resize_with(grid.cubes(), AtomicBool::default);
         stage.part(0.0..0.1).run(grid.blocks.len(), &|block| {
             let (mut around, mut near) = (Around::new(), Vec::new());
@@ -170,7 +168,7 @@ impl Level {
         let mut level = Self::new(&source, &stage.part(0.2..0.45))?;
         drop((positions, numbers, ends));
         level.sample(None, &stage.part(0.45..0.5))?;
-        let roles = Filling::new(level.grid.cubes(), "the cubes")?;
+        let roles = Filling::new(level.grid.cubes(), WHAT)?;
         level.grid.each_cube(&stage.part(0.5..0.55), &|brick, cube, bit| {
             // In whole numbers: a point must get its normal once.
             let whole = self.number(level.place(brick, bit) >> 1);
@@ -231,7 +229,7 @@ impl Level {
     #[inline(never)]
     pub fn fit(&mut self, stage: &Stage) -> Result<(), Error> {
         let grid = &self.grid;
-        let surfaces = Filling::new(self.grid.cubes(), "the surfaces")?;
+        let surfaces = Filling::new(self.grid.cubes(), WHAT)?;
         stage.run(grid.blocks.len(), &|block| {
             let (mut around, mut near, mut window) = (Around::new(), Vec::new(), Window::new());
             for (brick, cube, bit) in grid.cubes_in(block) {

@@ -40,6 +40,9 @@ pub(crate) struct Adaptive {
     pub scales: Vec<(f64, u64)>,
 }
 
+/// What errors call the memory of all this.
+const WHAT: &str = "the surfaces";
+
 /// How often a cube may be divided.
 const DIVISIONS: usize = 8;
 
@@ -149,7 +152,7 @@ impl Run<'_> {
         for end in 1..=parts.len() {
             points += if parts[end - 1] == Role::Wanted { levels[last].points(end - 1).len() } else { 0 };
             if points >= self.batch || end == parts.len() && points > 0 {
-                grow(&mut batches, 1, "the cubes")?;
+                grow(&mut batches, 1, WHAT)?;
                 batches.push((points, start..end));
                 (start, points) = (end, 0);
             }

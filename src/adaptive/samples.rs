@@ -1,5 +1,6 @@
 //! What surfaces are fitted to: points, or the centroids of several with their covariance.
 
+use super::WHAT;
 use super::matrix::Matrix;
 use crate::error::Error;
 use crate::lanes::{load, transposed};
@@ -83,7 +84,7 @@ pub(super) struct Writing {
 
 impl Writing {
     pub fn new(count: usize) -> Result<Self, Error> {
-        Ok(Self { numbers: Filling::new(NUMBERS * (count + BEYOND), "the samples")?, count })
+        Ok(Self { numbers: Filling::new(NUMBERS * (count + BEYOND), WHAT)?, count })
     }
 
     /// # Safety
@@ -195,10 +196,12 @@ impl Window {
         })
     }
 
-    /// Sums up `terms(x, y, z, weight; spread)` over all samples, the spread in the order xx, yy, zz, yz, xz, xy.
+    /// Sums up `terms(x, y, z, weight; points; spread)` over all samples, the spread in the order xx, yy, zz, yz, xz, xy.
     #[inline(always)]
-    pub fn sum_with_spread<const N: usize>(&self, terms: impl Fn(Lanes, [Vec4; 6]) -> [Vec4; N]) -> [f64; N] {
-        self.sum_lanes(|i| terms(self.lanes(i), [4, 5, 6, 7, 8, 9].map(|number| self.four(number, i))))
+    pub fn sum_with_spread<const N: usize>(&self, terms: impl Fn(Lanes, Vec4, [Vec4; 6]) -> [Vec4; N]) -> [f64; N] {
+        self.sum_lanes(|i| {
+            terms(self.lanes(i), self.four(POINTS, i), [4, 5, 6, 7, 8, 9].map(|number| self.four(number, i)))
+        })
     }
 
     #[inline(always)]

@@ -83,6 +83,22 @@ impl Surface {
     }
 }
 
+/// One over the variance of points anywhere in a sample, which is half an edge wide: noise of a variance v leaves 1/(1/v + this)
+/// inside of samples.
+pub(super) const SAMPLE: f64 = 48.0;
+
+/// Noise may lose no more than all but this share of it: what is thicker may be anything.
+const CUT: f64 = 0.3;
+
+/// There may be so much more than is expected from what is inside of the samples.
+const MORE: f64 = 1.15;
+
+/// Nor is noise what is not so many times as wide as thick, squared.
+const FLAT: f64 = 10.0;
+
+/// Of noise no slope of the samples explains more than chance does: the share that is enough to tell it.
+const NOISE: f64 = 0.9;
+
 /// With fewer samples a surface is taken for a plane.
 const QUADRIC_SAMPLES: f64 = 10.0;
 
@@ -156,13 +172,17 @@ impl Window {
             let mut noise = residual;
             // Else each sample is one point.
             if points > count {
-                let (within, between) = self.spread(&surface.quadric, total);
+                let [within, scatter, between] = self.spread(&surface.quadric, total);
                 noise += within;
                 // Lack of fit: the variance of a point, told by the samples' distances and by the spread in each.
                 let between = between * points / (count - 6.0);
                 let own = within * points / (points - count);
                 surface.within = own as f32;
-                surface.lacks_detail = between > own * (1.0 + 3.0 * (2.0 / (count - 6.0)).sqrt()) + DETAIL * DETAIL;
+                // Of noise the faces between the samples cut off a part. Where nothing tells the scatter, that is not a number.
+                let whole = own / (1.0 - SAMPLE * own).max(CUT);
+                let is_noise = scatter >= NOISE * own && noise <= MORE * whole && noise * FLAT <= across;
+                let most = own * (1.0 + 3.0 * (2.0 / (count - 6.0)).sqrt()) + DETAIL * DETAIL;
+                surface.lacks_detail = between > most && !is_noise;
             }
             surface.noise = noise as f32;
             surface.is_curved = true;
@@ -252,27 +272,36 @@ impl Window {
         Some(Fit { coefficients, variances, residual })
     }
 
-    /// The mean variance, across the surface, of the points behind the samples, and the variance of the samples' heights
-    /// over it: each over the mean of the surface at its points, which where it bends is not the surface at their mean.
-    fn spread(&self, quadric: &Quadric, total: f64) -> (f64, f64) {
+    /// The mean variance, across the surface, of the points behind the samples; what of it no slope of each sample explains,
+    /// for so many more points as that takes: of noise as much, of detail little larger than the samples far less; and the
+    /// variance of the samples' heights over the surface. Each over the mean of the surface at its points, which where it
+    /// bends is not the surface at their mean.
+    fn spread(&self, quadric: &Quadric, total: f64) -> [f64; 3] {
         let Quadric { centre, slope, bend, .. } = *quadric;
-        let [within, height, between] = self.sum_with_spread(|[x, y, z, w], [xx, yy, zz, yz, xz, xy]| {
-            let d = [x - centre.x, y - centre.y, z - centre.z];
-            let [a, b, c] = times_lanes(bend.splat(), d);
-            let Matrix { diagonal, off } = bend;
-            let sag =
-                diagonal.x * xx + diagonal.y * yy + diagonal.z * zz + 2.0 * (off.x * yz + off.y * xz + off.z * xy);
-            let height = dot_lanes(d, slope.to_array().map(Vec4::splat)) + 0.5 * (dot_lanes(d, [a, b, c]) + sag);
-            let (a, b, c) = (a + slope.x, b + slope.y, c + slope.z);
-            let squares = a * a * xx + b * b * yy + c * c * zz;
-            let products = b * c * yz + a * c * xz + a * b * xy;
-            let square = a * a + b * b + c * c;
-            [w * (squares + 2.0 * products) / square, w * height, w * height * height]
-        });
+        let [within, scatter, freedom, height, between] =
+            self.sum_with_spread(|[x, y, z, w], points, [xx, yy, zz, yz, xz, xy]| {
+                let spread = [[xx, yy, zz], [yz, xz, xy]];
+                let bend = bend.splat();
+                let d = [x - centre.x, y - centre.y, z - centre.z];
+                let [a, b, c] = times_lanes(bend, d);
+                let sag = dot_lanes(bend[0], spread[0]) + 2.0 * dot_lanes(bend[1], spread[1]);
+                let height = dot_lanes(d, slope.to_array().map(Vec4::splat)) + 0.5 * (dot_lanes(d, [a, b, c]) + sag);
+                let normal = [a + slope.x, b + slope.y, c + slope.z];
+                let turned = times_lanes(spread, normal);
+                let scale = 1.0 / dot_lanes(normal, normal);
+                let within = scale * dot_lanes(normal, turned);
+                // As if the points lay alike in all directions of the surface.
+                let along = 0.5 * (xx + yy + zz - within);
+                let explained = (scale * dot_lanes(turned, turned) - within * within) / along;
+                // A plane takes three points, and of samples with no more nothing is left.
+                let free = (w * (points - 3.0)).max(Vec4::ZERO);
+                let left = Vec4::select(free.cmpgt(Vec4::ZERO), w * points * (within - explained), Vec4::ZERO);
+                [w * within, left, free, w * height, w * height * height]
+            });
         let share = 1.0 / total;
         let height = share * height;
         // Rounding may leave less than nothing.
-        ((share * within).max(0.0), (share * between - height * height).max(0.0))
+        [(share * within).max(0.0), scatter / freedom, (share * between - height * height).max(0.0)]
     }
 }
 
@@ -460,33 +489,54 @@ mod tests {
         assert!(lacks_detail(|x, _| 0.1 * x.abs()));
     }
 
+    /// Of 4000 points at random in the cubes, so high over a slope.
+    fn scattered(slope: f32, mut height: impl FnMut(f32, &mut dyn FnMut() -> f32) -> f32) -> Surface {
+        let mut uniform = uniform();
+        let mut octants = std::collections::BTreeMap::<[i32; 3], Vec<Sample>>::new();
+        for _ in 0..4000 {
+            let (x, y) = (1.5 * uniform(), 1.5 * uniform());
+            let place = Vec3::new(x, y, 0.1 + slope * x + height(x, &mut uniform));
+            if place.abs().max_element() >= 1.5 {
+                continue;
+            }
+            let octant = (2.0 * place).floor().as_ivec3().to_array();
+            octants.entry(octant).or_default().push(Sample::point(place));
+        }
+        let samples: Vec<Sample> = octants.values().map(|points| Sample::of(points.iter().copied())).collect();
+        window_of(&samples).fit()
+    }
+
+    fn gauss(uniform: &mut dyn FnMut() -> f32) -> f32 {
+        (0..12).map(|_| uniform()).sum::<f32>() / 2.0
+    }
+
     /// Inside of samples half an edge wide; `vote.rs` rests on it.
     #[test]
     fn noise_is_in_the_samples_and_the_sides_of_a_wall_are_not() {
-        let mut uniform = uniform();
-        let mut within = |slope: f32, height: &dyn Fn(&mut dyn FnMut() -> f32) -> f32| {
-            let mut octants = std::collections::BTreeMap::<[i32; 3], Vec<Sample>>::new();
-            for _ in 0..4000 {
-                let (x, y) = (1.5 * uniform(), 1.5 * uniform());
-                let place = Vec3::new(x, y, 0.1 + slope * x + height(&mut uniform));
-                if place.abs().max_element() >= 1.5 {
-                    continue;
-                }
-                let octant = (2.0 * place).floor().as_ivec3().to_array();
-                octants.entry(octant).or_default().push(Sample::point(place));
-            }
-            let samples: Vec<Sample> = octants.values().map(|points| Sample::of(points.iter().copied())).collect();
-            window_of(&samples).fit().within
-        };
         for deviation in [0.1, 0.25, 0.4] {
             // Of a slope, so that it does not lie along the samples.
             let along_z = deviation * 2f32.sqrt();
-            let found = within(1.0, &|uniform| along_z * (0..12).map(|_| uniform()).sum::<f32>() / 2.0);
+            let found = scattered(1.0, |_, uniform| along_z * gauss(uniform)).within;
             let expected = 1.0 / (1.0 / (deviation * deviation) + 48.0);
             assert!((found / expected - 1.0).abs() < 0.15, "{found} instead of {expected}");
         }
-        let wall = within(0.0, &|uniform| if uniform() < 0.0 { 0.0 } else { 0.5 });
+        let wall = scattered(0.0, |_, uniform| if uniform() < 0.0 { 0.0 } else { 0.5 }).within;
         assert!(wall < 1e-4, "{wall}");
+    }
+
+    /// As thick as each other, and cut by the faces of the samples.
+    #[test]
+    fn noise_lacks_no_detail_but_waves_do() {
+        for deviation in [0.03, 0.1, 0.15] {
+            for slope in [0.3, 1.0] {
+                let lacks_detail = |height: &dyn Fn(f32, &mut dyn FnMut() -> f32) -> f32| {
+                    scattered(slope, |x, uniform| deviation * height(x, uniform)).lacks_detail
+                };
+                let about = format!("{deviation}, {slope}");
+                assert!(!lacks_detail(&|_, uniform| gauss(uniform)), "noise of {about}");
+                assert!(lacks_detail(&|x, _| 2f32.sqrt() * (6.0 * x).sin()), "waves of {about}");
+            }
+        }
     }
 
     #[test]

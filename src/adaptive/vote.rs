@@ -1,12 +1,12 @@
 //! The normals of the points, from the surfaces of the cubes round them.
 
-use super::DIVISIONS;
 use super::around::Around;
 use super::choose::{Chosen, MISFIT};
 use super::level::{Level, Role};
 use super::matrix::{dot_lanes, times_lanes};
-use super::surface::Surface;
+use super::surface::{SAMPLE, Surface};
 use super::tally::Tally;
+use super::{DIVISIONS, WHAT};
 use crate::error::Error;
 use crate::grid::Placed;
 use crate::lanes::{inverse_root, load, root, transposed};
@@ -51,9 +51,6 @@ const DIVIDED_POINTS: f32 = 60.0;
 /// agrees with everything.
 const UNSURE: f32 = 0.07;
 
-/// One over the variance of points anywhere in a sample, which is half an edge wide.
-const SAMPLE: f32 = 48.0;
-
 /// The share of what noise leaves inside of samples that tells it.
 const WITHIN: f32 = 0.8;
 
@@ -74,7 +71,7 @@ impl Vote<'_> {
     #[inline(never)]
     pub fn run(&self, stage: &Stage) -> Result<Vec<Role>, Error> {
         let level = self.level;
-        let parts = Filling::new(level.grid.cubes(), "the cubes")?;
+        let parts = Filling::new(level.grid.cubes(), WHAT)?;
         stage.run(level.grid.blocks.len(), &|block| {
             let mut task = Task::new(self);
             for (brick, cube, bit) in level.grid.cubes_in(block) {
@@ -173,7 +170,7 @@ impl<'a> Task<'a> {
     fn is_noisy(&self, own: &Chosen, surface: &Surface) -> bool {
         let is_coarse = |&&(_, cube): &&(Vec3, usize)| self.vote.chosen[cube].doublings > 0;
         let coarse = self.near.iter().filter(is_coarse).count();
-        let within = own.noise / (1.0 + SAMPLE * own.noise);
+        let within = own.noise / (1.0 + SAMPLE as f32 * own.noise);
         self.vote.division > 0
             && surface.error <= UNSURE
             && own.doublings > 0
