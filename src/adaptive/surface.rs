@@ -54,7 +54,7 @@ pub(super) struct Surface {
     pub points: f32,
     /// Whether more than a plane could be told.
     pub is_curved: bool,
-    /// Whether the samples lie off it by more than their points' own spread accounts for.
+    /// Whether the samples lie off it by more than their points' own spread accounts for, and than noise.
     pub lacks_detail: bool,
 }
 
@@ -87,16 +87,16 @@ impl Surface {
 /// inside of samples.
 pub(super) const SAMPLE: f64 = 48.0;
 
-/// Noise may lose no more than all but this share of it: what is thicker may be anything.
+/// So much of the noise must be left inside of samples: less does not tell how much there was.
 const CUT: f64 = 0.3;
 
-/// There may be so much more than is expected from what is inside of the samples.
+/// There may be so much more noise than what is left inside of samples tells.
 const MORE: f64 = 1.15;
 
-/// Nor is noise what is not so many times as wide as thick, squared.
+/// Noise is so many times as wide as thick, squared: what is not may be a small body.
 const FLAT: f64 = 10.0;
 
-/// Of noise no slope of the samples explains more than chance does: the share that is enough to tell it.
+/// The share of what is inside of samples that is left of noise when each may slope: all, but for chance.
 const NOISE: f64 = 0.9;
 
 /// With fewer samples a surface is taken for a plane.
@@ -178,7 +178,7 @@ impl Window {
                 let between = between * points / (count - 6.0);
                 let own = within * points / (points - count);
                 surface.within = own as f32;
-                // Of noise the faces between the samples cut off a part. Where nothing tells the scatter, that is not a number.
+                // Of noise the faces between the samples cut off a part. Where nothing tells the scatter, it is not a number.
                 let whole = own / (1.0 - SAMPLE * own).max(CUT);
                 let is_noise = scatter >= NOISE * own && noise <= MORE * whole && noise * FLAT <= across;
                 let most = own * (1.0 + 3.0 * (2.0 / (count - 6.0)).sqrt()) + DETAIL * DETAIL;
@@ -272,10 +272,10 @@ impl Window {
         Some(Fit { coefficients, variances, residual })
     }
 
-    /// The mean variance, across the surface, of the points behind the samples; what of it no slope of each sample explains,
-    /// for so many more points as that takes: of noise as much, of detail little larger than the samples far less; and the
-    /// variance of the samples' heights over the surface. Each over the mean of the surface at its points, which where it
-    /// bends is not the surface at their mean.
+    /// The mean variance, across the surface, of the points behind the samples; the variance of one of them over a plane of its
+    /// own sample, which of noise is as large, of detail a little larger than the samples far less; and the variance of the
+    /// samples' heights over the surface. The first and the last are over the mean of the surface at the points of a sample,
+    /// which where it bends is not the surface at their mean.
     fn spread(&self, quadric: &Quadric, total: f64) -> [f64; 3] {
         let Quadric { centre, slope, bend, .. } = *quadric;
         let [within, scatter, freedom, height, between] =
