@@ -35,7 +35,8 @@ pub(super) enum Role {
     Wanted,
     /// Cubes near it ask for its surface.
     Near,
-    /// The same, but it is part of a cube where all agree that rests on more than its smallest neighbourhood: so this does too.
+    /// The same, but it is part of a cube that got its normals from more than its smallest neighbourhood, because all round it
+    /// agree: so this one may only choose among larger ones too.
     Settled,
 }
 
@@ -225,7 +226,7 @@ impl Level {
         (self.grid.masks[brick] >> bit & 1 == 1).then(|| self.grid.cube(brick, bit) as usize)
     }
 
-    /// Finds the surface of every cube that does not have one, through the samples in it and the 26 round it.
+    /// Finds the surface of every cube, through the samples in it and the 26 round it; settled ones get none.
     #[inline(never)]
     pub fn fit(&mut self, stage: &Stage) -> Result<(), Error> {
         let grid = &self.grid;

@@ -134,8 +134,8 @@ impl Run<'_> {
         let level = &levels[levels.len() - 1];
         let vote = Vote { level, chosen, division, normals: self.normals, tally: self.tally };
         let parts = vote.run(stage)?;
-        let is_settled = |cube: usize| level.role(cube) == Role::Wanted && parts[cube] != Role::Wanted;
-        for (_, chosen) in chosen.iter().enumerate().filter(|&(cube, _)| is_settled(cube)) {
+        let is_done = |cube: usize| level.role(cube) == Role::Wanted && parts[cube] != Role::Wanted;
+        for (_, chosen) in chosen.iter().enumerate().filter(|&(cube, _)| is_done(cube)) {
             self.cubes += 1;
             self.surfaces += u64::from(chosen.is_some());
         }

@@ -94,10 +94,10 @@ const CUT: f64 = 0.3;
 const MORE: f64 = 1.15;
 
 /// Noise is so many times as wide as thick, squared: what is not may be a small body.
-const FLAT: f64 = 10.0;
+const WIDE: f64 = 10.0;
 
 /// The share of what is inside of samples that is left of noise when each may slope: all, but for chance.
-const NOISE: f64 = 0.9;
+const LEFT: f64 = 0.9;
 
 /// With fewer samples a surface is taken for a plane.
 const QUADRIC_SAMPLES: f64 = 10.0;
@@ -178,9 +178,9 @@ impl Window {
                 let between = between * points / (count - 6.0);
                 let own = within * points / (points - count);
                 surface.within = own as f32;
-                // Of noise the faces between the samples cut off a part. Where nothing tells the scatter, it is not a number.
+                // Of noise the faces between the samples cut off a part.
                 let whole = own / (1.0 - SAMPLE * own).max(CUT);
-                let is_noise = scatter >= NOISE * own && noise <= MORE * whole && noise * FLAT <= across;
+                let is_noise = scatter >= LEFT * own && noise <= MORE * whole && noise * WIDE <= across;
                 let most = own * (1.0 + 3.0 * (2.0 / (count - 6.0)).sqrt()) + DETAIL * DETAIL;
                 surface.lacks_detail = between > most && !is_noise;
             }
@@ -273,9 +273,10 @@ impl Window {
     }
 
     /// The mean variance, across the surface, of the points behind the samples; the variance of one of them over a plane of its
-    /// own sample, which of noise is as large, of detail a little larger than the samples far less; and the variance of the
-    /// samples' heights over the surface. The first and the last are over the mean of the surface at the points of a sample,
-    /// which where it bends is not the surface at their mean.
+    /// own sample, which of noise is as large, of detail a little larger than the samples far less, and less too where hardly
+    /// any sample has more points than a plane takes; and the variance of the samples' heights over the surface. The first and
+    /// the last are over the mean of the surface at the points of a sample, which where it bends is not the surface at their
+    /// mean.
     fn spread(&self, quadric: &Quadric, total: f64) -> [f64; 3] {
         let Quadric { centre, slope, bend, .. } = *quadric;
         let [within, scatter, freedom, height, between] =
@@ -291,8 +292,10 @@ impl Window {
                 let scale = 1.0 / dot_lanes(normal, normal);
                 let within = scale * dot_lanes(normal, turned);
                 // As if the points lay alike in all directions of the surface.
-                let along = 0.5 * (xx + yy + zz - within);
+                let along = (0.5 * (xx + yy + zz - within)).max(Vec4::splat(f32::MIN_POSITIVE));
                 let explained = (scale * dot_lanes(turned, turned) - within * within) / along;
+                // Rounding may leave anything.
+                let explained = explained.max(Vec4::ZERO).min(within);
                 // A plane takes three points, and of samples with no more nothing is left.
                 let free = (w * (points - 3.0)).max(Vec4::ZERO);
                 let left = Vec4::select(free.cmpgt(Vec4::ZERO), w * points * (within - explained), Vec4::ZERO);
@@ -301,7 +304,7 @@ impl Window {
         let share = 1.0 / total;
         let height = share * height;
         // Rounding may leave less than nothing.
-        [(share * within).max(0.0), scatter / freedom, (share * between - height * height).max(0.0)]
+        [(share * within).max(0.0), scatter / freedom.max(total), (share * between - height * height).max(0.0)]
     }
 }
 
@@ -502,8 +505,11 @@ mod tests {
             let octant = (2.0 * place).floor().as_ivec3().to_array();
             octants.entry(octant).or_default().push(Sample::point(place));
         }
-        let samples: Vec<Sample> = octants.values().map(|points| Sample::of(points.iter().copied())).collect();
-        window_of(&samples).fit()
+        // And some in one place.
+        let place = Vec3::new(0.0, 0.0, 0.1);
+        let one = Sample { points: 5.0, ..Sample::point(place) };
+        let samples = octants.values().map(|points| Sample::of(points.iter().copied())).chain([one]);
+        window_of(&samples.collect::<Vec<Sample>>()).fit()
     }
 
     fn gauss(uniform: &mut dyn FnMut() -> f32) -> f32 {
@@ -517,7 +523,7 @@ mod tests {
             // Of a slope, so that it does not lie along the samples.
             let along_z = deviation * 2f32.sqrt();
             let found = scattered(1.0, |_, uniform| along_z * gauss(uniform)).within;
-            let expected = 1.0 / (1.0 / (deviation * deviation) + 48.0);
+            let expected = 1.0 / (1.0 / (deviation * deviation) + SAMPLE as f32);
             assert!((found / expected - 1.0).abs() < 0.15, "{found} instead of {expected}");
         }
         let wall = scattered(0.0, |_, uniform| if uniform() < 0.0 { 0.0 } else { 0.5 }).within;

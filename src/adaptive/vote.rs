@@ -105,7 +105,8 @@ impl<'a> Task<'a> {
         Self { vote, writer, around: Around::new(), near: Vec::new(), ballot: Ballot::default(), resolved: 0 }
     }
 
-    /// Finds the normals of the points of a cube, unless it is to be divided: then its parts are wanted.
+    /// Finds the normals of the points of a cube, unless it is to be divided: answers what its parts would be for, and only
+    /// those of a divided one are wanted.
     #[optimize(size)]
     #[inline(never)]
     fn settle(&mut self, brick: usize, cube: usize, bit: u32) -> Role {
