@@ -3,7 +3,7 @@
 //! `docs/adaptive.md` explains the rule, its sources and its limits. In short: a quadratic surface through the 27 cubes
 //! round each cube, on grids of ever larger cubes ([`level`], [`surface`]); for each cube the size that is least in error
 //! ([`choose`]); where the surfaces round a cube then agree they give the normals of its points, where not the cube is
-//! divided, and in the smallest cubes the points vote ([`vote`]).
+//! divided, and where that is of no use or not possible the points vote ([`vote`]).
 
 mod around;
 mod choose;

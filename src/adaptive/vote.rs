@@ -41,7 +41,7 @@ const DISTANCE_FLOOR: f32 = 9e-8;
 const SMOOTH: f32 = 0.05;
 
 /// So many where noise decides: then the normals differ because of it, but no more than on one surface. And where the smallest
-/// neighbourhood knows its normal so well, the cube need not be divided to learn that it is noise.
+/// neighbourhood knows its normal so well, a cube that looks noisy is: it need not be divided to see.
 const SMOOTH_IN_NOISE: f32 = 0.12;
 
 /// Cubes whose surface rests on fewer points are not divided: the surfaces of the halves would rest on a quarter of them.
@@ -67,7 +67,6 @@ pub(super) struct Vote<'a> {
 impl Vote<'_> {
     /// Finds the normals of the points in the wanted cubes of the level, but not in those that are to be divided: answers
     /// what the parts of each cube would be for.
-    #[optimize(size)]
     #[inline(never)]
     pub fn run(&self, stage: &Stage) -> Result<Vec<Role>, Error> {
         let level = self.level;
