@@ -4,6 +4,7 @@ use super::level::Level;
 use super::surface::Quadric;
 use super::{SIZES, WHAT};
 use crate::error::Error;
+use crate::lanes::load;
 use crate::parallel::Filling;
 use crate::progress::Stage;
 use bytemuck::{Pod, Zeroable};
@@ -11,7 +12,7 @@ use glam::{IVec3, Vec3, Vec4};
 
 /// The surface that was chosen for a cube of the smallest level, in its edges and against its centre.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
-#[repr(C, align(16))]
+#[repr(C)]
 pub(super) struct Chosen {
     /// About the centroid of the cube's points; its slope there is a unit vector, or zero if there is no surface.
     pub quadric: Quadric,
@@ -21,8 +22,6 @@ pub(super) struct Chosen {
     pub chance: f32,
     /// Variance of the angle of the normal, with what the surface does not fit; infinite if there is no surface.
     pub error: f32,
-    /// Variance of the points along it, in the direction in which it is less.
-    pub width: f32,
     /// The surface variation there.
     pub variation: f32,
     /// The noise again, if the surface is thin against its width, so that its noise can be compared; infinite if not.
@@ -38,7 +37,6 @@ impl Chosen {
         noise: 0.0,
         chance: 1.0,
         error: f32::INFINITY,
-        width: 1.0,
         variation: 0.0,
         flat_noise: f32::INFINITY,
         doublings: 0,
@@ -49,10 +47,11 @@ impl Chosen {
         self.error < f32::INFINITY
     }
 
-    /// All in their order.
+    /// All that votes, in its order.
     #[inline(always)]
-    pub fn numbers(&self) -> &[Vec4; 5] {
-        bytemuck::cast_ref(self)
+    pub fn numbers(&self) -> [Vec4; 4] {
+        let numbers: &[f32; 19] = bytemuck::cast_ref(self);
+        std::array::from_fn(|i| load(&numbers[4 * i..]))
     }
 }
 
@@ -60,7 +59,7 @@ impl Chosen {
 const EXCESS: f32 = 6.0;
 
 /// The square angle that a misfit of the size of the neighbourhood is taken for.
-pub(super) const MISFIT: f32 = 2.0;
+const MISFIT: f32 = 2.0;
 
 /// A neighbourhood is flat when it is so many times as wide as thick, squared.
 const FLAT: f32 = 2.0;
@@ -129,7 +128,7 @@ fn of_cube(levels: &[Level], mut cube: IVec3, centroid: Vec3) -> Chosen {
             let quadric = Quadric { centre: centroid, height: height * scale * edge, slope: normal, bend };
             let flat_noise = if is_flat { noise } else { f32::INFINITY };
             let variation = surface.variation;
-            best = Chosen { quadric, noise, chance, error, width, variation, flat_noise, doublings };
+            best = Chosen { quadric, noise, chance, error, variation, flat_noise, doublings };
         }
         if is_flat {
             reference = reference.min(noise * (1.0 + EXCESS * (2.0 / (surface.points - 6.0)).sqrt()));

@@ -1,7 +1,7 @@
 //! The normals of the points, from the surfaces of the cubes round them.
 
 use super::around::Around;
-use super::choose::{Chosen, MISFIT};
+use super::choose::Chosen;
 use super::level::{Level, Role};
 use super::matrix::{dot_lanes, times_lanes};
 use super::surface::{SAMPLE, Surface};
@@ -36,6 +36,13 @@ const ANGLE_FLOOR: f32 = 1e-6;
 
 /// Nor lies nearer to a point than 0.0003 edges, squared.
 const DISTANCE_FLOOR: f32 = 9e-8;
+
+/// No more noise than so many times that of the place, a low quartile of what is known by few points, is a misfit.
+const NOISIER: f32 = 1.25;
+
+/// The square angle that a misfit of one square edge is taken for, however wide the surface is: a thin plate or a row of waves
+/// is a thick plane to large neighbourhoods, and the more certainly so the larger they are, but that is not its normal.
+const MISFIT: f32 = 2.0;
 
 /// Where all normals round a cube agree within so many radians, and the sum of their deviations, nothing needs a vote.
 const SMOOTH: f32 = 0.05;
@@ -252,21 +259,20 @@ impl Voters {
         let [sx, sy, sz, xx] = lanes(1);
         let [yy, zz, yz, xz] = lanes(2);
         let [xy, noise, chance, error] = lanes(3);
-        let [width, ..] = lanes(4);
         let [a, b, c, d] = four.map(|(step, _)| step);
         let centre = [
             cx + Vec4::new(a.x, b.x, c.x, d.x),
             cy + Vec4::new(a.y, b.y, c.y, d.y),
             cz + Vec4::new(a.z, b.z, c.z, d.z),
         ];
-        let misfit = (noise - reference * (1.0 + chance) - DISTANCE_FLOOR).max(Vec4::ZERO);
+        let misfit = (noise - reference * (NOISIER + chance) - DISTANCE_FLOOR).max(Vec4::ZERO);
         Self {
             centre,
             height,
             slope: [sx, sy, sz],
             bend: [[xx, yy, zz], [yz, xz, xy]],
             error,
-            weight: 1.0 / (error + ANGLE_FLOOR + MISFIT * misfit / width),
+            weight: 1.0 / (error + ANGLE_FLOOR + MISFIT * misfit),
             fall: FALL / (noise + DISTANCE_FLOOR),
         }
     }
