@@ -221,7 +221,7 @@ fn ditches_and_pits_look_up() {
     for (number, cloud) in pits.iter().chain([&ditch]).enumerate() {
         let result = orient(&cloud.points, Orient::Consistent);
         let right = share_right(&result.normals, &cloud.normals);
-        assert!(right > 0.999, "{number}: {right}, {:?}", components(&result)[0]);
+        assert!(right > 0.99, "{number}: {right}, {:?}", components(&result)[0]);
     }
 }
 
@@ -456,7 +456,7 @@ fn what_is_hollow_does_not_face_itself() {
 /// What stands on it is one surface with it, and neither its volume nor the convention says which side is up.
 #[test]
 fn ground_faces_what_stands_on_it() {
-    for (seed, height) in [(51, 0.3), (52, 0.8)] {
+    for (seed, height) in [(51, 0.3), (52, 0.8), (53, 1.2), (54, 2.4)] {
         let mut random = Random(seed);
         let walls = 1.6 * height;
         let cloud = Cloud::of((0..100_000).map(|_| {
@@ -485,7 +485,7 @@ fn ground_faces_what_stands_on_it() {
 #[test]
 fn a_surface_with_one_side_is_not_called_right() {
     // Closed surfaces have more than 0.6.
-    for (noise, bound) in [(0.0, 0.2), (0.0012, 0.2), (0.006, 0.2), (0.012, 0.4)] {
+    for (noise, bound) in [(0.0, 0.2), (0.0012, 0.2), (0.006, 0.3), (0.012, 0.4)] {
         let cloud = Cloud { points: moebius(100_000, 16), normals: vec![] }.noisy(noise, 9);
         for how in [Orient::Consistent, Orient::Outward] {
             let result = orient(&cloud.points, how);

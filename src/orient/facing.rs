@@ -43,12 +43,20 @@ const SURE: f64 = 16.0;
 const SURE_OF_LARGEST: f64 = 5.0;
 
 /// Where the balance is less than this share of all, nothing is told however many look: shadows let looks through to the wrong
-/// side.
+/// side. After the first round there are more of these: a wall looks at the back of what was scanned from one side before it.
 const ONE_SIDED: f64 = 0.2;
+const ONE_SIDED_LATER: f64 = 0.8;
 
 /// What holds less volume is told by its own parts, too, as ground is by what stands on it. Other open surfaces look at their own
 /// hollow side: with 0.1 a sixth of a pipe does, with 0.5 what one range image shows of a body.
 const HOLLOW: f64 = 0.05;
+
+/// The largest surface is ground to which all is joined that stands on it, or steps between walls, if it holds less than this
+/// and its own parts all but agree on its side, and these are no few of its patches: range images of hills look at themselves
+/// from both sides. Two thirds of a half pipe hold 0.37, three faces of a box 0.4.
+const BULGE: f64 = 0.35;
+const AGREED: f64 = 0.85;
+const LEAST_OWN: f64 = 0.04;
 
 /// What holds less is flat: only that is told by what was told before. Boxes of which two walls are missing have 0.3, and are
 /// looked at from behind through the gap.
@@ -60,12 +68,39 @@ const MOST_CONFIDENCE: f64 = 0.5;
 /// Rounds at the most: in each, what was told in the one before looks out.
 const ROUNDS: usize = 8;
 
-/// How much a surface is looked at.
+/// Looks at a surface.
 #[derive(Clone, Copy, Default)]
 struct Looks {
     /// At the side that its normals point to, less at the other.
     balance: f64,
     all: f64,
+}
+
+impl Looks {
+    /// Whether they are at one side, but for so much.
+    fn agree(&self, share: f64) -> bool {
+        self.balance.abs() > share * self.all
+    }
+}
+
+/// How much a surface is looked at, by others and by its own parts.
+#[derive(Clone, Copy, Default)]
+struct Looked {
+    others: Looks,
+    own: Looks,
+}
+
+impl Looked {
+    /// What counts of the looks at a surface.
+    fn count(&self, decision: &Decision, is_largest: bool) -> Looks {
+        let Self { others, own } = *self;
+        let is_ground = is_largest && decision.volume < BULGE && own.agree(AGREED);
+        if decision.volume < HOLLOW || is_ground && own.balance.abs() > LEAST_OWN * decision.patches as f64 {
+            Looks { balance: others.balance + own.balance, all: others.all + own.all }
+        } else {
+            others
+        }
+    }
 }
 
 /// Turns the surfaces that are not closed to face what looks at them.
@@ -89,7 +124,7 @@ pub(super) fn turn_to_what_looks(
     let mut is_settled = filled(false, decisions.len(), WHAT)?;
     for (is_settled, decision) in is_settled.iter_mut().zip(&*decisions) {
         let is_closed = decision.component.side == Side::Air;
-        *is_settled = is_closed || decision.patches < LEAST_PATCHES || is_alone && decision.volume >= HOLLOW;
+        *is_settled = is_closed || decision.patches < LEAST_PATCHES || is_alone && decision.volume >= BULGE;
     }
     if !is_settled.contains(&false) {
         return Ok(());
@@ -101,12 +136,9 @@ pub(super) fn turn_to_what_looks(
         let is_looker = all > LEAST_OPEN && exposure.abs() > IN_THE_OPEN * all && exposure.abs() < MOST_OPEN;
         is_looker.then_some(exposure < 0.0)
     };
-    let counts = |patch: usize, is_flipped: bool, other: usize| match component(signs, other) {
-        own if own == component(signs, patch) => decisions[own].volume < HOLLOW,
-        _ => is_flipped == signs.flipped[patch],
-    };
-    let looks = look(grid, patches, signs, &is_settled, &open_side, &counts)?;
-    let mut fresh = tell(looks, signs, decisions, &mut is_settled)?;
+    let agrees = |patch: usize, is_flipped: bool| is_flipped == signs.flipped[patch];
+    let looked = look(grid, patches, signs, &is_settled, &open_side, &agrees)?;
+    let mut fresh = tell(looked, ONE_SIDED, signs, decisions, &mut is_settled)?;
 
     for (is_settled, decision) in is_settled.iter_mut().zip(&*decisions) {
         *is_settled |= decision.volume >= FLAT;
@@ -117,23 +149,25 @@ pub(super) fn turn_to_what_looks(
         }
         stage.tell(round as f64 / ROUNDS as f64)?;
         let front_side = |patch: usize| fresh[component(signs, patch)].then_some(signs.flipped[patch]);
-        let looks = look(grid, patches, signs, &is_settled, &front_side, &|_, _, _| true)?;
-        fresh = tell(looks, signs, decisions, &mut is_settled)?;
+        let looked = look(grid, patches, signs, &is_settled, &front_side, &|_, _| true)?;
+        fresh = tell(looked, ONE_SIDED_LATER, signs, decisions, &mut is_settled)?;
     }
     Ok(())
 }
 
 /// Turns the surfaces that are looked at from behind, and answers which were told, those included.
 fn tell(
-    looks: Vec<Looks>,
+    looked: Vec<Looked>,
+    one_sided: f64,
     signs: &mut Signs,
     decisions: &mut [Decision],
     is_settled: &mut [bool],
 ) -> Result<Vec<bool>, Error> {
-    let (mut fresh, mut is_turned) = (filled(false, looks.len(), WHAT)?, filled(false, looks.len(), WHAT)?);
-    for (i, Looks { balance, all }) in looks.into_iter().enumerate() {
-        let sure = if i == 0 { SURE_OF_LARGEST } else { SURE };
-        if balance * balance > sure * all && balance.abs() > ONE_SIDED * all {
+    let (mut fresh, mut is_turned) = (filled(false, looked.len(), WHAT)?, filled(false, looked.len(), WHAT)?);
+    for (i, looked) in looked.into_iter().enumerate() {
+        let looks = looked.count(&decisions[i], i == 0);
+        let (Looks { balance, all }, sure) = (looks, if i == 0 { SURE_OF_LARGEST } else { SURE });
+        if balance * balance > sure * all && looks.agree(one_sided) {
             (is_settled[i], fresh[i], is_turned[i]) = (true, true, balance < 0.0);
             let component = &mut decisions[i].component;
             (component.side, component.confidence) = (Side::Sight, MOST_CONFIDENCE * balance.abs() / all);
@@ -146,16 +180,16 @@ fn tell(
 }
 
 /// How much each surface that is not settled is looked at. `side` answers for patches that look out whether they do so against
-/// their normal; `counts(patch, against its normal, other)` whether what it sees of another tells anything.
+/// their normal; `counts(patch, against its normal)` whether what it sees of others tells anything.
 fn look(
     grid: &Grid,
     patches: &Patches,
     signs: &Signs,
     is_settled: &[bool],
     side: &dyn Fn(usize) -> Option<bool>,
-    counts: &dyn Fn(usize, bool, usize) -> bool,
-) -> Result<Vec<Looks>, Error> {
-    let mut looks = filled(Looks::default(), is_settled.len(), WHAT)?;
+    counts: &dyn Fn(usize, bool) -> bool,
+) -> Result<Vec<Looked>, Error> {
+    let mut looked = filled(Looked::default(), is_settled.len(), WHAT)?;
     let rays = Rays::through(grid);
     let step = (0..patches.all.len()).filter(|&patch| side(patch).is_some()).count().div_ceil(LOOKERS);
     let mut lookers = 0;
@@ -175,21 +209,24 @@ fn look(
                 }
                 let Some(hit) = rays.first(place, direction) else { continue };
                 for other in patches.of_cube(hit) {
-                    let (seen, component) = (&patches.all[other], signs.component[other] as usize);
-                    if is_settled[component]
-                        || !counts(patch, is_flipped, other)
+                    let (seen, component) = (&patches.all[other], signs.component[other]);
+                    let is_own = component == signs.component[patch];
+                    if is_settled[component as usize]
+                        || !(is_own || counts(patch, is_flipped))
                         || is_hidden(seen, &patches.all[patches.of_cube(hit)], -direction)
                     {
                         continue;
                     }
                     let along = -signed(signs.flipped[other], seen.normal).dot(ray) * seen.certainty();
-                    looks[component].balance += f64::from(along);
-                    looks[component].all += f64::from(along.abs());
+                    let Looked { others, own } = &mut looked[component as usize];
+                    let looks = if is_own { own } else { others };
+                    looks.balance += f64::from(along);
+                    looks.all += f64::from(along.abs());
                 }
             }
         }
     }
-    Ok(looks)
+    Ok(looked)
 }
 
 /// The occupied cubes, and the box round them.
