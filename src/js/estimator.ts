@@ -86,14 +86,21 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
       running = queue.shift();
     }
     if (!running) return link?.hold(false);
-    try {
-      running.begun = performance.now();
-      running.tell('start', 0);
+    attempt((job) => {
+      job.begun = performance.now();
       link ??= start();
       link.hold(true);
-      link.post(running.call, buffersOf(running.call));
+      link.post(job.call, buffersOf(job.call));
+      job.tell('start', 0);
+    });
+  }
+
+  /** Does what runs the caller's own function, which may throw, and may stop the running call: then another runs. */
+  function attempt(action: (job: Job) => void, job = running!) {
+    try {
+      action(job);
     } catch (error) {
-      crash(error);
+      if (running === job) crash(error);
     }
   }
 
@@ -118,14 +125,8 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
       answered = true;
       if (mine !== link || !running) return;
       if ('result' in reply) finish('resolve', reply.result);
-      else if ('phase' in reply) {
-        try {
-          running.tell(reply.phase, reply.fraction);
-        } catch (error) {
-          // The caller's own function threw.
-          crash(error);
-        }
-      } else {
+      else if ('phase' in reply) attempt((job) => job.tell(reply.phase, reply.fraction));
+      else {
         const { code, message, fatal, ...details } = reply.failure;
         if (!code) return fail(message);
         if (fatal) endWorker();
@@ -140,7 +141,7 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
   async function run(options: ReadOptions, prepare: (tell: Job['tell']) => Call | Promise<Call>): Promise<any> {
     want(options, 'options', options, 'an object');
     const { signal, onProgress } = options;
-    want(!onProgress || onProgress.call, 'onProgress', onProgress, 'a function');
+    want((onProgress ?? want).call, 'onProgress', onProgress, 'a function');
     signal?.throwIfAborted();
     let told = 0;
     const tell = (phase: string, fraction: number) => {

@@ -191,6 +191,27 @@ test('what onProgress throws rejects the call, and the next one works', async ()
   await estimateNormals(sphere(100));
 });
 
+test('a call that stops itself at its first progress, and throws or not, leaves the next ones alone', async (context) => {
+  const estimator = await estimatorFor(context, { threads: 1 });
+  for (const oops of [undefined, new Error('oops')]) {
+    const control = new AbortController();
+    const enough = new Error('enough');
+    const onProgress = () => {
+      control.abort(enough);
+      if (oops) throw oops;
+    };
+    const before = estimator.estimateNormals(sphere(2000));
+    const stopped = estimator.estimateNormals(sphere(3000), { signal: control.signal, onProgress });
+    const after = [4000, 5000].map((count) => estimator.estimateNormals(sphere(count)));
+    await assert.rejects(stopped, enough);
+    assert.equal((await before).normals.length, 6000);
+    assert.deepEqual(
+      (await Promise.all(after)).map(({ normals }) => normals.length),
+      [12000, 15000],
+    );
+  }
+});
+
 test('abort: before the call, in the queue, and while wasm runs; the estimator stays usable', async (context) => {
   const estimator = await estimatorFor(context, { threads: 2 });
   const positions = sphere(200000);
