@@ -151,8 +151,8 @@ function takeDrops(session: Session): void {
 
 /** Clicks on a surface, and Enter for the one in the middle of the window, while surfaces are being turned. */
 function takeTurns(session: Session, viewer: Viewer): void {
-  /** A press that moves further, in pixels, moves the camera instead. */
-  const STILL = 4;
+  /** A press that moves further, in pixels, moves the camera instead: a finger is less steady. */
+  const still = (pointer: string) => (pointer === 'touch' ? 12 : 4);
   const canvas = element('#canvas');
   const turn = (at?: { x: number; y: number }) => {
     const { turning, job } = store.state;
@@ -161,17 +161,17 @@ function takeTurns(session: Session, viewer: Viewer): void {
     return point;
   };
   let turned = -1;
-  let pressed = { x: NaN, y: NaN };
+  let pressed = { x: NaN, y: NaN, by: '' };
   let moved = 0;
-  canvas.addEventListener('pointerdown', ({ clientX: x, clientY: y }) => {
-    pressed = { x, y };
+  canvas.addEventListener('pointerdown', ({ clientX: x, clientY: y, pointerType: by }) => {
+    pressed = { x, y, by };
     moved = 0;
   });
   canvas.addEventListener('pointermove', ({ clientX: x, clientY: y }) => {
     moved = Math.max(moved, Math.hypot(x - pressed.x, y - pressed.y));
   });
   canvas.addEventListener('click', ({ clientX: x, clientY: y, detail }) => {
-    if (detail < 2) turned = moved <= STILL ? turn({ x, y }) : -1;
+    if (detail < 2) turned = moved <= still(pressed.by) ? turn({ x, y }) : -1;
   });
   canvas.addEventListener('dblclick', () => {
     // Two clicks centre the view: what the first has turned is turned back.

@@ -7,11 +7,13 @@ const SAMPLE = 1_000_000;
 
 /**
  * Index of the point met by the ray from `eye` along the unit vector `along`, or -1. A point is met within the angle
- * whose tangent is `slope`.
+ * whose tangent is `slope`, and within the `radius` that it is drawn with.
  */
-export function pickPoint(positions: Float32Array, eye: Vector, along: Vector, slope: number): number {
+export function pickPoint(positions: Float32Array, eye: Vector, along: Vector, slope: number, radius: number): number {
   const points = positions.length / 3;
   const step = Math.max(1, Math.floor(points / SAMPLE));
+  // Those looked at stand for the others.
+  const reach = radius * Math.sqrt(step);
   let best = -1;
   let nearest = Infinity;
   for (let i = 0; i < points; i += step) {
@@ -21,7 +23,7 @@ export function pickPoint(positions: Float32Array, eye: Vector, along: Vector, s
     const depth = x * along[0] + y * along[1] + z * along[2];
     if (!(depth > 0) || depth >= nearest) continue;
     const offset = x * x + y * y + z * z - depth * depth;
-    if (offset > (slope * depth) ** 2) continue;
+    if (offset > Math.max(slope * depth, reach) ** 2) continue;
     nearest = depth;
     best = i;
   }

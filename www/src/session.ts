@@ -186,8 +186,9 @@ export function createSession(store: Store, viewer: Viewer): Session {
       if (!shown?.result) return;
       negate(shown.result.normals);
       viewer.refreshNormals();
-      // Without back faces both sides look the same.
-      store.set({ flipped: !store.state.flipped, backs: true });
+      // Without back faces both sides look the same when shaded; normals as colours do not.
+      const { flipped, backs, shading } = store.state;
+      store.set({ flipped: !flipped, backs: backs || shading === 'shaded' });
     },
 
     flipSurface(point) {

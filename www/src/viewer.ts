@@ -116,6 +116,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   let frame = 0;
   let lastFrame = 0;
   let lastMove = -Infinity;
+  let wasMoving = false;
   let affordable = SPARSE_MOST;
 
   function request(): void {
@@ -126,7 +127,9 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     frame = 0;
     controls.update();
     const moving = now - lastMove < STILL;
-    if (moving) adapt(now - lastFrame);
+    // Before the first frame of a movement lies a gap, which says nothing.
+    if (moving && wasMoving) adapt(now - lastFrame);
+    wasMoving = moving;
     lastFrame = now;
     const drawn = moving ? thinOut() : 1;
     if (!moving) points.geometry = whole;
@@ -138,9 +141,9 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
 
   /** Learns from the time since the last frame how many points this machine draws smoothly. */
   function adapt(elapsed: number): void {
-    // A longer gap is the start of a movement or a hidden window and says nothing.
-    if (!sparse || elapsed > 400) return;
-    if (elapsed > SLOW_FRAME) affordable = Math.max(SPARSE_LEAST, affordable * 0.75);
+    if (!sparse) return;
+    const share = Math.min(0.75, Math.max(0.1, SLOW_FRAME / elapsed));
+    if (elapsed > SLOW_FRAME) affordable = Math.max(SPARSE_LEAST, affordable * share);
     else if (elapsed < FAST_FRAME) affordable = Math.min(SPARSE_MOST, affordable * 1.08);
   }
 
@@ -260,6 +263,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     if (width === 0 || height === 0) return;
     renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     renderer.setSize(width, height, false);
+    // Five degrees for a press of a key, whatever the size of the window.
+    controls.keyRotateSpeed = height / 72;
     reframe();
   }
 
@@ -299,7 +304,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     const eye = new Vector3(...viewer.eye());
     const along = points.worldToLocal(behind).sub(eye).normalize();
     const slope = (6 / box.height) * 2 * Math.tan((camera.fov * Math.PI) / 360);
-    return pickPoint(cloud.positions, eye.toArray(), along.toArray(), slope);
+    const radius = material.size / 2 / turned.scale.x;
+    return pickPoint(cloud.positions, eye.toArray(), along.toArray(), slope, radius);
   }
 
   function focus(event: MouseEvent): void {
