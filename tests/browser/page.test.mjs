@@ -142,6 +142,18 @@ test('a file dropped while another is worked on takes its place', async () => {
   assert.equal(await page.locator('#name').textContent(), 'small.ply');
 });
 
+test('what is no scan stops no work', async () => {
+  page = await browser.openPage(browser.isolated);
+  await choose(page, 'large.ply', spherePly(3_000_000));
+  await drop(page, 'notes.txt', Buffer.from('Milk, bread'));
+  await page
+    .getByRole('alert')
+    .filter({ hasText: /^notes\.txt is no PLY file/ })
+    .waitFor();
+  await page.waitForFunction(() => document.querySelector('#facts').childElementCount > 0);
+  assert.equal(await page.locator('#name').textContent(), 'large.ply');
+});
+
 test('of several files the first scan is taken, and folders are refused', async () => {
   page = await browser.openPage(browser.isolated);
   await drop(page, 'ball.PLY', spherePly(5_000), ['photo.jpg']);

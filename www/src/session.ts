@@ -160,11 +160,17 @@ export function createSession(store: Store, viewer: Viewer): Session {
       estimateNormals(warmingCloud(), { orient: 'consistent', components: true }).catch(ignore);
     },
 
-    open: (file) =>
-      run(file.name, async (step) => {
+    async open(file) {
+      // What was dropped by mistake stops nothing.
+      if (current && !(await beginsAsPly(file)) && current) {
+        store.set({ error: `${file.name} is no PLY file, so the work on the one before goes on` });
+        return;
+      }
+      await run(file.name, async (step) => {
         await show(file, step);
         await shade(step);
-      }),
+      });
+    },
 
     openSample: () =>
       run('The sample', async (step) => {
@@ -226,6 +232,15 @@ export function createSession(store: Store, viewer: Viewer): Session {
 function negate(normals: Float32Array, components?: Uint32Array, surface?: number): void {
   for (let i = 0; i < normals.length; i++) {
     if (components?.[Math.floor(i / 3)] === surface) normals[i] = 0 - normals[i]!;
+  }
+}
+
+/** What cannot be read says so when it is. */
+async function beginsAsPly(file: File): Promise<boolean> {
+  try {
+    return (await file.slice(0, 3).text()) === 'ply';
+  } catch {
+    return true;
   }
 }
 
