@@ -161,7 +161,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
     },
 
     async open(file) {
-      // What was dropped by mistake stops nothing.
+      // What was dropped by mistake stops no work, unless that ends meanwhile.
       if (current && !(await beginsAsPly(file)) && current) {
         store.set({ error: `${file.name} is no PLY file, so the work on the one before goes on` });
         return;
