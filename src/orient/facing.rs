@@ -51,9 +51,9 @@ const ONE_SIDED_LATER: f64 = 0.8;
 /// hollow side: with 0.1 a sixth of a pipe does, with 0.5 what one range image shows of a body.
 const HOLLOW: f64 = 0.05;
 
-/// The largest surface is ground to which all is joined that stands on it, or steps between walls, if it holds less than this
-/// and its own parts all but agree on its side, and these are no few of its patches: range images of hills look at themselves
-/// from both sides. Two thirds of a half pipe hold 0.37, three faces of a box 0.4.
+/// The largest surface is ground to which all is joined that stands on it if it holds less than this, its own parts all but
+/// agree on its side, and their looks are worth no small share of its patches: range images of hills look at themselves from
+/// both sides. Two thirds of a half pipe hold 0.37, and so much do steps between walls.
 const BULGE: f64 = 0.35;
 const AGREED: f64 = 0.85;
 const LEAST_OWN: f64 = 0.04;
