@@ -457,10 +457,12 @@ fn what_is_hollow_does_not_face_itself() {
 /// What stands on it is one surface with it, and neither its volume nor the convention says which side is up.
 #[test]
 fn ground_faces_what_stands_on_it() {
-    for (seed, height) in [(51, 0.3), (52, 0.8), (53, 1.2), (54, 2.4)] {
+    for (seed, count, height) in
+        [(51, 100_000, 0.3), (52, 100_000, 0.8), (53, 100_000, 1.2), (54, 100_000, 2.4), (55, 1_000_000, 1.2)]
+    {
         let mut random = Random(seed);
         let walls = 1.6 * height;
-        let cloud = Cloud::of((0..100_000).map(|_| {
+        let cloud = Cloud::of((0..count).map(|_| {
             let (x, y, share) = (random.signed(), random.signed(), random.unit() * (4.0 + walls));
             // Half of a box without a floor is as wide as 0.2; downwards, so that the convention says the opposite.
             let is_under = x.abs() < 0.2 && y.abs() < 0.2;
@@ -480,6 +482,37 @@ fn ground_faces_what_stands_on_it() {
         let right = share_right(&result.normals, &cloud.normals);
         assert!(right > 0.999, "{height}: {right}, {:?}", components(&result)[0]);
         assert_eq!(components(&result)[0].side, Side::Sight, "{height}");
+    }
+}
+
+/// A ball, cut by the ground that it stands on, which it meets at some angle: where that is sharp, the edges say the opposite
+/// of what the ball sees.
+#[test]
+fn ground_faces_what_bulges_over_it() {
+    for (seed, count, angle) in
+        [(61, 20_000, 40.0), (62, 20_000, 30.0), (63, 100_000, 35.0), (64, 100_000, 25.0), (65, 400_000, 20.0)]
+    {
+        let mut random = Random(seed);
+        let cut = -f64::cos(f64::to_radians(angle));
+        let mut cloud = Cloud::of(
+            std::iter::repeat_with(|| {
+                if random.unit() < 0.5 {
+                    let z = cut + (1.0 - cut) * random.unit();
+                    let (r, turn) = ((1.0 - z * z).sqrt(), std::f64::consts::TAU * random.unit());
+                    let normal = [r * turn.cos(), r * turn.sin(), z];
+                    Some((normal, normal))
+                } else {
+                    let (x, y) = (2.5 * random.signed(), 2.5 * random.signed());
+                    (x.hypot(y) > (1.0 - cut * cut).sqrt()).then_some(([x, y, cut], [0.0, 0.0, 1.0]))
+                }
+            })
+            .flatten()
+            .take(count),
+        );
+        cloud = cloud.noisy(0.0002, seed);
+        let result = orient(&cloud.points, Orient::Consistent);
+        let right = share_right(&result.normals, &cloud.normals);
+        assert!(right > 0.99, "{count}, {angle} degrees: {right}, {:?}", components(&result)[0]);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Which side of a patch is open to the air.
 
-use super::patches::{Patch, Patches};
+use super::patches::{Patch, Patches, signed};
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
@@ -23,6 +23,17 @@ const HALF: f32 = 9.0;
 /// sides, with 2.5 the ends of tubes as thin are torn, with 4 the corners of rooms, which are seen from behind.
 const AIR: f32 = 2.0;
 
+/// A patch that sees so much more of the open on one side than on the other, of all that it sees, has that side in the open:
+/// objects have, ground and walls do not.
+const IN_THE_OPEN: f32 = 0.5;
+
+/// A side sees less of the open than the other if the difference is so much of all: ground sees it from both.
+const MORE: f32 = 0.2;
+
+/// Less of the open is a gap, and what sees so much of it has next to nothing else before it: all on one side is 0.67 to 0.74.
+const LEAST_OPEN: f32 = 0.05;
+const MOST_OPEN: f32 = 0.66;
+
 /// What errors call the memory of all this.
 const WHAT: &str = "the open sides";
 
@@ -41,6 +52,18 @@ impl Sights {
         let share = |exposure: f32, all: f32| exposure * (exposure.abs() / all.max(f32::MIN_POSITIVE));
         let sights = self.exposure.iter().zip(&self.all);
         sights.zip(&patches.all).map(move |((&exposure, &all), patch)| AIR * patch.certainty() * share(exposure, all))
+    }
+
+    /// Of a patch that has one side in the open, and something before that, whether its normal points to the other.
+    pub fn open_side(&self, patch: usize) -> Option<bool> {
+        let (exposure, all) = (self.exposure[patch], self.all[patch]);
+        let is_open = all > LEAST_OPEN && exposure.abs() > IN_THE_OPEN * all && exposure.abs() < MOST_OPEN;
+        is_open.then_some(exposure < 0.0)
+    }
+
+    /// Whether the side of a patch that its normal points to, or the other one, sees less of the open than that behind it.
+    pub fn is_back(&self, patch: usize, is_against: bool) -> bool {
+        signed(is_against, self.exposure[patch]) < -MORE * self.all[patch]
     }
 }
 

@@ -3,11 +3,13 @@
 
 use super::air::Sights;
 use super::links::{GRAPH, Link, Links};
+use super::looks::{Look, Looks};
 use super::patches::{Patches, signed};
 use crate::error::Error;
-use crate::lists::{filled, starts};
+use crate::lists::{filled, reserve, starts};
 use crate::power::exp2;
 use crate::progress::Stage;
+use std::iter;
 
 /// Groups of patches that agree, groups of such groups, and so on, up to the components, which at most touch each other.
 pub(super) struct Groups {
@@ -48,7 +50,11 @@ impl Groups {
             stage.tell(done(own.len()))?;
             let Some(Merging { group, flipped, groups }) = merge(&links, &own, &sizes)? else { break };
             stage.tell(done((own.len() + groups) / 2))?;
-            let (merged, sums) = gather(&links, &own, &group, &flipped, groups)?;
+            let merged = gather(&links, &group, &flipped, groups)?;
+            let mut sums = filled(0.0, groups, GRAPH)?;
+            for (one, &group) in group.iter().enumerate() {
+                sums[group as usize] += signed(flipped[one], own[one]);
+            }
             let mut counts = filled(0, groups, GRAPH)?;
             group.iter().zip(&sizes).for_each(|(&group, &size)| counts[group as usize] += size);
             component.iter_mut().for_each(|component| *component = group[*component as usize]);
@@ -70,11 +76,11 @@ impl Groups {
 
     /// Whether to flip each patch, so that the sum of all evidence becomes large. Linear in the links.
     pub fn signs(&self, stage: &Stage) -> Result<Vec<bool>, Error> {
-        let mut flipped = self.descend(1.0, false, &stage.part(0.0..0.4))?;
+        let mut flipped = self.descend(1.0, None, &stage.part(0.0..0.4))?;
         let Some(Level { links, own, .. }) = self.levels.first() else { return Ok(flipped) };
         // Flipping one small group after the other does not reach a far better choice behind worse ones, as where both
         // sides of a thin noisy wall were taken for one.
-        let bold = self.descend(BOLDNESS, false, &stage.part(0.4..0.8))?;
+        let bold = self.descend(BOLDNESS, None, &stage.part(0.4..0.8))?;
         // Both were mended last of all.
         if bold == flipped {
             return Ok(flipped);
@@ -88,19 +94,40 @@ impl Groups {
                 *flipped = bold;
             }
         }
-        mend(links, &|one| own[one], &mut flipped)?;
+        mend(links, None, &|one| own[one], &mut flipped)?;
         Ok(flipped)
     }
 
     /// The same where what speaks for a sign by itself may mislead. For the patches of a group that adds up like its area, the
-    /// evidence of its neighbours only like its rim: the former is made to grow like that too.
-    pub fn cautious_signs(&self, stage: &Stage) -> Result<Vec<bool>, Error> {
-        self.descend(1.0, true, stage)
+    /// evidence of its neighbours only like its rim: the former is made to grow like that too. Instead the looks of its patches
+    /// at each other count.
+    pub fn cautious_signs(&self, looks: &Looks, sights: &Sights, stage: &Stage) -> Result<Vec<bool>, Error> {
+        let mut links = self.across_the_air(looks, sights)?;
+        let mut levels = Vec::new();
+        reserve(&mut levels, self.levels.len(), GRAPH)?;
+        for Level { group, flipped, .. } in &self.levels {
+            let groups = group.iter().max().map_or(0, |&last| last as usize + 1);
+            let merged = gather(&links, group, flipped, groups)?;
+            levels.push(std::mem::replace(&mut links, merged));
+        }
+        self.descend(1.0, Some(&levels), stage)
+    }
+
+    /// What the looks of the patches of each component at each other say, but for those at the back of what itself sees the open
+    /// from its front, as roofs do whose walls are missing.
+    fn across_the_air(&self, looks: &Looks, sights: &Sights) -> Result<Links, Error> {
+        let weight = LOOK * looks.step as f32;
+        let told = looks.all.iter().filter(|&&Look { from, to, along, .. }| {
+            let is_own = self.component[from as usize] == self.component[to as usize];
+            is_own && !sights.is_back(to as usize, along < 0.0)
+        });
+        let link = |look: &Look| (look.from, Link { to: look.to, evidence: weight * look.evidence() });
+        Links::both_ways(self.component.len(), told.map(link))
     }
 
     /// From the components to the patches: whatever gains by being flipped is. `trust` is the weight of what speaks for a sign
-    /// by itself, which in a group may count like its rim.
-    fn descend(&self, trust: f32, like_rim: bool, stage: &Stage) -> Result<Vec<bool>, Error> {
+    /// by itself; where there are links across the air, for each level, it counts in a group like its rim.
+    fn descend(&self, trust: f32, across: Option<&[Links]>, stage: &Stage) -> Result<Vec<bool>, Error> {
         let mut flipped = filled(false, self.own.len(), GRAPH)?;
         flipped.iter_mut().zip(&self.own).for_each(|(flipped, own)| *flipped = *own < 0.0);
         for (number, Level { links, own, sizes, group, flipped: within }) in self.levels.iter().enumerate().rev() {
@@ -111,9 +138,9 @@ impl Groups {
                 *finer = within ^ flipped[group as usize];
             }
             flipped = finer;
-            let rim = |one: usize| if like_rim { (sizes[one] as f32).sqrt().recip() } else { 1.0 };
+            let rim = |one: usize| if across.is_some() { (sizes[one] as f32).sqrt().recip() } else { 1.0 };
             let share = |one: usize| trust * own[one] * rim(one);
-            mend(links, &share, &mut flipped)?;
+            mend(links, across.map(|across| &across[number]), &share, &mut flipped)?;
         }
         Ok(flipped)
     }
@@ -128,6 +155,9 @@ const ROUNDS: usize = 40;
 
 /// How much more than by rights the second choice trusts what speaks for a sign by itself.
 const BOLDNESS: f32 = 3.0;
+
+/// What a look that hits head-on counts against links that count up to 1.
+const LOOK: f32 = 0.2;
 
 /// What the evidence says to the sign of one, given those of the others.
 fn support(links: &Links, flipped: &[bool], one: usize) -> f32 {
@@ -221,20 +251,11 @@ fn root(parents: &mut [(u32, bool)], mut one: u32) -> (u32, bool) {
     }
 }
 
-/// The links between groups, and what speaks for the sign of each by itself.
+/// The links between groups.
 #[inline(never)]
-fn gather(
-    links: &Links,
-    own: &[f32],
-    group: &[u32],
-    flipped: &[bool],
-    groups: usize,
-) -> Result<(Links, Vec<f32>), Error> {
-    let (mut sums, mut counts) = (filled(0.0, groups, GRAPH)?, filled(0u32, groups, GRAPH)?);
-    for (one, &group) in group.iter().enumerate() {
-        sums[group as usize] += signed(flipped[one], own[one]);
-        counts[group as usize] += 1;
-    }
+fn gather(links: &Links, group: &[u32], flipped: &[bool], groups: usize) -> Result<Links, Error> {
+    let mut counts = filled(0u32, groups, GRAPH)?;
+    group.iter().for_each(|&group| counts[group as usize] += 1);
     // The members of each group, one after the other.
     let first = starts(&counts, GRAPH)?;
     let mut members = filled(0u32, group.len(), GRAPH)?;
@@ -267,12 +288,12 @@ fn gather(
             }
         })?;
     }
-    Ok((merged, sums))
+    Ok(merged)
 }
 
-/// Flips what gains by it, round by round; each flip raises the sum of all evidence.
+/// Flips what gains by it by the links, also those `across` the air, round by round; each flip raises the sum of all evidence.
 #[inline(never)]
-fn mend(links: &Links, own: &dyn Fn(usize) -> f32, flipped: &mut [bool]) -> Result<(), Error> {
+fn mend(links: &Links, across: Option<&Links>, own: &dyn Fn(usize) -> f32, flipped: &mut [bool]) -> Result<(), Error> {
     /// More flip next to nothing.
     const ROUNDS: usize = 16;
     /// Less is rounding.
@@ -285,10 +306,12 @@ fn mend(links: &Links, own: &dyn Fn(usize) -> f32, flipped: &mut [bool]) -> Resu
             if !std::mem::take(&mut is_stirred[one]) {
                 continue;
             }
-            if support(links, flipped, one) + signed(flipped[one], own(one)) < -LEAST {
+            let each = || iter::once(links).chain(across);
+            let evidence: f32 = each().map(|links| support(links, flipped, one)).sum();
+            if evidence + signed(flipped[one], own(one)) < -LEAST {
                 flipped[one] = !flipped[one];
                 any = true;
-                links.from(one).iter().for_each(|link| is_stirred[link.to as usize] = true);
+                each().flat_map(|links| links.from(one)).for_each(|link| is_stirred[link.to as usize] = true);
             }
         }
         if !any {

@@ -4,7 +4,7 @@ use super::patches::{Patch, Patches};
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
-use crate::lists::{fitted, grow, reserve};
+use crate::lists::{filled, fitted, grow, reserve, starts};
 use crate::parallel::Filling;
 use crate::progress::Stage;
 use crate::surroundings::{NEAR, Places, Surroundings};
@@ -94,6 +94,29 @@ impl Links {
         })?;
         // SAFETY: the blocks hold all cubes, and these all patches.
         Ok(Self { runs: unsafe { runs.complete() }, lists })
+    }
+
+    /// Of so many patches, from links that are told from one of their ends each.
+    pub fn both_ways(count: usize, told: impl Iterator<Item = (u32, Link)> + Clone) -> Result<Self, Error> {
+        let mut counts = filled(0u32, count, GRAPH)?;
+        for (from, link) in told.clone() {
+            counts[from as usize] += 1;
+            counts[link.to as usize] += 1;
+        }
+        let first = starts(&counts, GRAPH)?;
+        let mut list = filled(Link { to: 0, evidence: 0.0 }, first[count], GRAPH)?;
+        let mut put = |one: u32, link: Link| {
+            counts[one as usize] -= 1;
+            list[first[one as usize] + counts[one as usize] as usize] = link;
+        };
+        for (from, link) in told {
+            put(from, link);
+            put(link.to, Link { to: from, evidence: link.evidence });
+        }
+        let mut links = Self::with_capacity(count)?;
+        links.runs.extend(first.windows(2).map(|run| Run { list: 0, start: run[0], end: run[1] }));
+        links.lists.push(list);
+        Ok(links)
     }
 
     /// Memory for those of so many patches or groups.

@@ -2,8 +2,8 @@
 //!
 //! `docs/orientation.md` explains the rule, its sources and its limits. In short: the points of each small cube are parted
 //! into patches ([`patches`]), a patch and those round it say whether their signs agree ([`links`]), which sides of a patch
-//! are open to the air says which way is out ([`air`]), and the signs are chosen that these agree with best ([`groups`]). What
-//! is open then faces what stands before it ([`facing`]).
+//! are open to the air says which way is out ([`air`]), and the signs are chosen that these agree with best ([`groups`]), of
+//! open surfaces also what their parts see of each other ([`looks`]). These then face what stands before them ([`facing`]).
 
 mod air;
 mod components;
@@ -11,6 +11,7 @@ mod cubes;
 mod facing;
 mod groups;
 mod links;
+mod looks;
 mod patches;
 mod signs;
 
@@ -109,13 +110,14 @@ fn surfaces(
     let links = Links::of(&grid, &patches, noise, &stage.part(0.55..0.7))?;
     let groups = Groups::of(links, &sights, &patches, &stage.part(0.7..0.85))?;
     let choice = stage.part(0.85..0.9);
-    let mut signs = match options.orient {
-        Orient::Outward => Signs::outward(groups, &choice)?,
-        _ => Signs::consistent(groups, &sights, &choice)?,
+    let (mut signs, looks) = match options.orient {
+        Orient::Outward => (Signs::outward(groups, &choice)?, None),
+        _ => Signs::consistent(groups, &grid, &patches, &sights, &choice)?,
     };
     let mut decisions = decide(&grid, &patches, &sights, &mut signs)?;
     if options.orient == Orient::Consistent {
-        facing::turn_to_what_looks(&grid, &patches, &sights, &mut signs, &mut decisions, &stage.part(0.9..0.95))?;
+        let facing = stage.part(0.9..0.95);
+        facing::turn_to_what_looks(&grid, &patches, &sights, looks, &mut signs, &mut decisions, &facing)?;
     }
     let components = Components::of(&decisions)?;
     let of_point = turn(&grid, &patches, &members, &signs, normals, options.components, &stage.part(0.95..1.0))?;

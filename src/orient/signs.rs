@@ -2,8 +2,10 @@
 
 use super::air::Sights;
 use super::groups::Groups;
-use super::patches::signed;
+use super::looks::Looks;
+use super::patches::{Patches, signed};
 use crate::error::Error;
+use crate::grid::Grid;
 use crate::lists::filled;
 use crate::progress::Stage;
 
@@ -30,19 +32,29 @@ impl Signs {
         Ok(Self { flipped, components: groups.components(), component: groups.component })
     }
 
-    /// Counts all that lies in the open for components that are closed then, and for others a share.
-    pub fn consistent(groups: Groups, sights: &Sights, stage: &Stage) -> Result<Self, Error> {
+    /// Counts all that lies in the open for components that are closed then, and for others a share, beside the looks of their
+    /// patches at each other, which are answered if there are any such.
+    pub fn consistent(
+        groups: Groups,
+        grid: &Grid,
+        patches: &Patches,
+        sights: &Sights,
+        stage: &Stage,
+    ) -> Result<(Self, Option<Looks>), Error> {
         let mut flipped = groups.signs(&stage.part(0.0..0.5))?;
         let is_closed = closed(&groups, sights, &flipped)?;
+        let mut looks = None;
         if is_closed.contains(&false) {
-            let cautious = groups.cautious_signs(&stage.part(0.5..1.0))?;
+            let seen = Looks::from_the_open(grid, patches, sights)?;
+            let cautious = groups.cautious_signs(&seen, sights, &stage.part(0.5..1.0))?;
             for ((flipped, cautious), &component) in flipped.iter_mut().zip(cautious).zip(&groups.component) {
                 if !is_closed[component as usize] {
                     *flipped = cautious;
                 }
             }
+            looks = Some(seen);
         }
-        Ok(Self { flipped, components: groups.components(), component: groups.component })
+        Ok((Self { flipped, components: groups.components(), component: groups.component }, looks))
     }
 }
 
