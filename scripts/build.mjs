@@ -1,5 +1,5 @@
 // Builds dist/: both wasm packages by wasm-pack, then the JavaScript by the TypeScript compiler and esbuild.
-// All flags of the builds are here, in single.toml and threads.toml beside this file, and in Cargo.toml.
+// All flags of the builds are here, in minify.mjs, single.toml and threads.toml beside this file, and in Cargo.toml.
 
 import { createHash } from 'node:crypto';
 import { existsSync, mkdirSync, readFileSync, readdirSync, renameSync, rmSync, writeFileSync } from 'node:fs';
@@ -32,8 +32,10 @@ const JAVASCRIPT_LIMIT = 8;
 
 /** Builds what has changed, and then tells the sizes. */
 export function build() {
-  const flags = ['scripts/build.mjs', 'scripts/glue.mjs', 'scripts/single.toml', 'scripts/threads.toml'];
-  const wasmSources = [...filesIn('src', '.rs'), ...flags, 'Cargo.toml', 'Cargo.lock', 'rust-toolchain.toml'];
+  const scripts = ['build.mjs', 'glue.mjs', 'minify.mjs', 'single.toml', 'threads.toml'].map(
+    (name) => `scripts/${name}`,
+  );
+  const wasmSources = [...filesIn('src', '.rs'), ...scripts, 'Cargo.toml', 'Cargo.lock', 'rust-toolchain.toml'];
   const built = Object.keys(WASM).map((name) =>
     once(`dist/${name} by wasm-pack`, wasmSources, [`dist/${name}/core.wasm`, `dist/${name}/full.wasm`], () =>
       buildWasm(name),
@@ -83,7 +85,7 @@ function buildWasm(name) {
   const missing = core.split('\n').find((line) => !full.includes(line));
   if (missing) throw new Failure(`${folder}: the glue of the core has a line that is not in the full one: ${missing}`);
   writeFileSync(join(root, folder, 'bilinormal.js'), shortenGlue(WASM[name].finish(full), folder));
-  esbuild([`${folder}/bilinormal.js`, `--outfile=${folder}/bilinormal.js`, '--allow-overwrite']);
+  minify([`${folder}/bilinormal.js`]);
 }
 
 /** Builds one module by wasm-pack; leaves it under its name, and answers its glue. */
@@ -130,12 +132,12 @@ function buildJavaScript() {
     (path) => `--external:${path}`,
   );
   const scripts = SCRIPTS.map((name) => `src/js/${name}.ts`);
-  esbuild([...scripts, '--bundle', '--packages=external', ...apart, '--outdir=dist']);
+  const form = ['--format=esm', '--target=es2022', '--log-level=warning'];
+  run('esbuild', [...scripts, '--bundle', '--packages=external', ...apart, ...form, '--outdir=dist']);
+  minify(SCRIPTS.map((name) => `dist/${name}.js`));
 }
 
-function esbuild(options) {
-  run('esbuild', [...options, '--minify', '--format=esm', '--target=es2022', '--log-level=warning']);
-}
+const minify = (paths) => run(process.execPath, ['scripts/minify.mjs', ...paths]);
 
 /** What a browser downloads, gzipped. */
 export function sizes() {

@@ -40,6 +40,14 @@ test('wasm files can be addressed by name', () => {
   );
 });
 
+test('addresses of scripts and modules stand there as plain strings, which every bundler sees', () => {
+  const found = ['index', 'worker'].flatMap((name) => {
+    const script = readFileSync(join(home, 'dist', `${name}.js`), 'utf8');
+    return [...script.matchAll(/(?:new URL|import)\((.)\.\/[\w/]+\.(\w+)/g)].map(([, quote, kind]) => quote + kind);
+  });
+  assert.deepEqual(found.sort(), ['"js', '"js', '"js', '"js', '"wasm', '"wasm', '"wasm', '"wasm']);
+});
+
 test('importing does nothing, and a process that is done ends without a word', () => {
   const idle = node(`
     import * as everything from 'bilinormal';
