@@ -2,16 +2,17 @@
 
 use crate::error::Error;
 
-/// Takes memory for `count` more items, or says how much was needed.
+/// Takes memory for `count` more items, or says how much all of them need.
 pub(crate) fn reserve<T>(items: &mut Vec<T>, count: usize, what: &str) -> Result<(), Error> {
-    let needed = count as u64 * size_of::<T>() as u64;
+    let needed = (items.len() as u64 + count as u64) * size_of::<T>() as u64;
     items.try_reserve_exact(count).map_err(|_| Error::memory(what, needed))
 }
 
-/// Takes memory for `count` more items, and for as many again as there are: for a list that grows bit by bit.
+/// Takes memory for `count` more items, and for as many again as there are: for a list that grows bit by bit. Where that is
+/// not to be had, for a sixteenth as many: fewer would be copied too often.
+#[inline(never)]
 pub(crate) fn grow<T>(items: &mut Vec<T>, count: usize, what: &str) -> Result<(), Error> {
-    let needed = (items.len() + count) as u64 * size_of::<T>() as u64;
-    items.try_reserve(count).map_err(|_| Error::memory(what, needed))
+    items.try_reserve(count).or_else(|_| reserve(items, count.max(items.len() / 16), what))
 }
 
 /// The same list without room to grow, or how much memory that lacked.

@@ -86,7 +86,8 @@ impl<T> Gathering<T> {
             if list.try_reserve(more.len()).is_ok() {
                 list.append(&mut more);
             } else {
-                let needed = (list.len() + more.len()) as u64 * size_of::<T>() as u64;
+                // Twice the room there was.
+                let needed = (list.len() + more.len()).max(2 * list.capacity()) as u64 * size_of::<T>() as u64;
                 *items = Err(Error::memory(self.what, needed));
             }
         }

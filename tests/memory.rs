@@ -3,20 +3,39 @@
 
 mod common;
 
-use bilinormal::{Cell, Options, Orient, Points, Progress, estimate_owned};
+use bilinormal::ply::{self, Additions};
+use bilinormal::{Cell, Error, Options, Orient, Points, Progress, estimate_owned};
 use common::*;
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 static CURRENT: AtomicUsize = AtomicUsize::new(0);
 static PEAK: AtomicUsize = AtomicUsize::new(0);
+/// What may be in use at once.
+static LIMIT: AtomicUsize = AtomicUsize::new(usize::MAX);
+/// No such block is refused: the library need not expect that.
+const SMALL: usize = 1 << 16;
+/// The last block that was refused, and what was free then.
+static REFUSED: AtomicUsize = AtomicUsize::new(0);
+static FREE: AtomicUsize = AtomicUsize::new(0);
+/// One test at a time, because the counters are those of the process.
+static ALONE: Mutex<()> = Mutex::new(());
 
 struct Counting;
 
-// SAFETY: passes every call on to the system's allocator.
+// A block grows by a copy, for `realloc` is the default one: as it is in WebAssembly.
+// SAFETY: passes every call that it does not refuse on to the system's allocator.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let now = CURRENT.fetch_add(layout.size(), Relaxed) + layout.size();
+        let before = CURRENT.fetch_add(layout.size(), Relaxed);
+        let now = before + layout.size();
+        if now > LIMIT.load(Relaxed) && layout.size() > SMALL {
+            CURRENT.fetch_sub(layout.size(), Relaxed);
+            REFUSED.store(layout.size(), Relaxed);
+            FREE.store(LIMIT.load(Relaxed).saturating_sub(before), Relaxed);
+            return std::ptr::null_mut();
+        }
         PEAK.fetch_max(now, Relaxed);
         unsafe { System.alloc(layout) }
     }
@@ -30,9 +49,9 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// One test, because the counter is one for the process.
 #[test]
 fn peak_bytes_a_point() {
+    let _alone = ALONE.lock();
     let sphere = sphere(1_000_000, 1).points;
     let stray = |far: f32| [sphere.clone(), vec![far, far, far]].concat();
     // In a solid no surface fits: every cube is divided as far as it goes.
@@ -67,5 +86,40 @@ fn peak_bytes_a_point() {
         let each = peak / (points.len() / 3);
         println!("{name}: {each} bytes a point, {} cubes", result.report.cells);
         assert!(each <= bound, "{name}: {each} bytes a point");
+    }
+}
+
+#[test]
+fn a_file_is_written_where_it_fits_and_no_more() {
+    let _alone = ALONE.lock();
+    const POINTS: usize = 400_000;
+    const MEBIBYTE: usize = 1 << 20;
+    let mut random = Random(3);
+    let mut text = format!("ply\nformat ascii 1.0\nelement vertex {POINTS}\n").into_bytes();
+    text.extend_from_slice(b"property float x\nproperty float y\nproperty float z\nend_header\n");
+    for _ in 0..POINTS {
+        let [x, y, z] = [random.signed(), random.signed(), random.signed()];
+        text.extend_from_slice(format!("{x:.5} {y:.4} {z:.3}\n").as_bytes());
+    }
+    let normals = vec![0.25; 3 * POINTS];
+    let add = Additions { normals: Some(&normals), curvature: None };
+    // With more than one, each may be refused a block.
+    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    for ascii in [false, true] {
+        let write = || one.install(|| ply::write(&text, &add, ascii, &Progress::silent()));
+        let expected = write().unwrap();
+        let before = CURRENT.load(Relaxed);
+        // Not half as much again: the parts that are being written take some.
+        LIMIT.store(before + expected.len() + 6 * MEBIBYTE, Relaxed);
+        let written = write();
+        LIMIT.store(before + expected.len() - MEBIBYTE, Relaxed);
+        let refused = write();
+        LIMIT.store(usize::MAX, Relaxed);
+        assert!(written.is_ok_and(|file| file == expected), "ascii: {ascii}");
+        let Err(Error::Limit { needed, .. }) = refused else {
+            panic!("ascii: {ascii}: {:?}", refused.map(|file| file.len()));
+        };
+        assert_eq!(needed, REFUSED.load(Relaxed) as u64, "what was refused is what is told");
+        assert!(needed > FREE.load(Relaxed) as u64);
     }
 }

@@ -70,6 +70,11 @@ impl Element<'_> {
         Some(stride)
     }
 
+    /// The bytes of all rows in a binary file, as far as they do not depend on lists.
+    pub fn bytes(&self) -> usize {
+        self.stride().unwrap_or(0).saturating_mul(self.count as usize)
+    }
+
     /// The name for an error text.
     pub fn label(&self) -> String {
         shorten(self.name)

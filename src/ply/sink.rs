@@ -2,6 +2,7 @@
 
 use super::scalar::Scalar;
 use crate::error::Error;
+use crate::lists::grow;
 use crate::number::{print, print_whole};
 
 /// Bytes written so far. Memory is asked for, never taken for granted.
@@ -17,8 +18,14 @@ impl Sink {
 
     /// Takes memory for so many bytes more; with room to grow further, as a vector does.
     pub fn make_room(&mut self, bytes: usize) -> Result<(), Error> {
-        let needed = self.bytes.len() as u64 + bytes as u64;
-        self.bytes.try_reserve(bytes).map_err(|_| Error::memory("the PLY file", needed))
+        grow(&mut self.bytes, bytes, "the PLY file")
+    }
+
+    /// Takes memory for about so many bytes in all, a guess; without it memory is taken as bytes come.
+    pub fn expect(&mut self, bytes: f64) {
+        if self.bytes.capacity() < bytes as usize {
+            let _ = self.bytes.try_reserve_exact((1.03 * bytes) as usize - self.bytes.len());
+        }
     }
 
     #[inline(never)]

@@ -37,10 +37,14 @@ pub fn write(file: &[u8], add: &Additions, ascii: bool, progress: &Progress) -> 
     let mut sink = Sink::new(true);
     write_header(&header, index, &steps, ascii, &mut sink)?;
     sink.text = ascii;
-    if header.format != Format::Ascii && !ascii {
-        // Nothing grows but the vertices, so this is all that is ever needed.
+    if !ascii {
+        // Nothing grows but the vertices, so this is all that is ever needed, but for lists that were text.
+        let rows = match header.format {
+            Format::Ascii => header.elements.iter().map(Element::bytes).fold(0, usize::saturating_add),
+            _ => file.len() - header.body,
+        };
         let grown = steps.iter().filter(|step| step.put < Step::KEEP).count();
-        sink.make_room((file.len() - header.body).saturating_add(grown.saturating_mul(4 * vertex.count as usize)))?;
+        sink.make_room(rows.saturating_add(grown.saturating_mul(4 * vertex.count as usize)))?;
     }
     // Without properties there is nothing to write, however many rows there are.
     let filled = |element: &Element| if element.properties.is_empty() { 0.0 } else { element.count as f64 };
@@ -210,6 +214,7 @@ impl Writer<'_> {
 
     /// Any rows to any format, value by value.
     fn translate(&self, parts: &[Part], sink: &mut Sink, stage: &Stage) -> Result<(), Error> {
+        let start = sink.bytes.len();
         let mut done = 0;
         for wave in parts.chunks(tasks::wave()) {
             let stage = stage.part(done as f64 / parts.len() as f64..(done + wave.len()) as f64 / parts.len() as f64);
@@ -221,8 +226,14 @@ impl Writer<'_> {
                 *outputs[i].lock().unwrap_or_else(PoisonError::into_inner) = output.bytes;
                 Ok(())
             })?;
+            let outputs: Vec<Vec<u8>> =
+                outputs.into_iter().map(|output| output.into_inner().unwrap_or_else(PoisonError::into_inner)).collect();
+            // Rows are much alike, and the first ones tell how much all of them take.
+            let rows = |parts: &[Part]| parts.iter().map(|part| part.count).sum::<usize>() as f64;
+            let written = sink.bytes.len() - start + outputs.iter().map(Vec::len).sum::<usize>();
+            sink.expect(start as f64 + written as f64 * rows(parts) / rows(&parts[..done]));
             for output in outputs {
-                sink.append(&output.into_inner().unwrap_or_else(PoisonError::into_inner))?;
+                sink.append(&output)?;
             }
         }
         Ok(())

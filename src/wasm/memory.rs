@@ -75,6 +75,6 @@ pub fn set_maximum(pages: u32) {
 
 /// What could be had at most instead of the block that was refused last.
 pub(super) fn available(needed: u64) -> u64 {
-    // Nobody asks for a larger one.
-    if needed > LARGEST_BLOCK { LARGEST_BLOCK } else { AVAILABLE.load(Relaxed) as u64 }
+    // Nobody asks for a larger one. And less than was needed: of two threads either may have been refused last.
+    if needed > LARGEST_BLOCK { LARGEST_BLOCK } else { (needed - 1).min(AVAILABLE.load(Relaxed) as u64) }
 }
