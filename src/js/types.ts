@@ -1,6 +1,11 @@
 /** `x0 y0 z0 x1 ...`; the length is a multiple of 3. Views of a part of a buffer and of shared memory are accepted. */
 export type Positions = Float32Array | Float64Array;
 
+// Arrays that own plain, not shared memory, as Blobs and `postMessage` want them. Before TypeScript 5.7 no type says so.
+type Floats = ReturnType<typeof Float32Array.of>;
+type Wholes = ReturnType<typeof Uint32Array.of>;
+type Bytes = ReturnType<typeof Uint8Array.of>;
+
 /**
  * Where bytes come from: a File or another Blob (streamed into the worker, never whole in JavaScript memory), bytes
  * (copied), or a URL or Response (downloaded; in Node, `file:` URLs too).
@@ -61,7 +66,7 @@ export interface EstimateResult {
    * Unit length, or zero where a point is not finite or has no neighbours that tell a plane: none, or all along a line or in
    * one place; as many numbers as `positions`.
    */
-  normals: Float32Array;
+  normals: Floats;
   /**
    * If asked for, the surface variation lambda3 / (lambda1 + lambda2 + lambda3) (Pauly, Gross and Kobbelt 2002), one
    * number a point: 0 where the neighbourhood is flat, up to 1/3 where it has no direction; 0 for unresolved points too.
@@ -69,12 +74,12 @@ export interface EstimateResult {
    * the cubes round the point, with `cell: 'auto'` those that were chosen for its cube; for `'knn'` and `'egg'` the k
    * nearest points.
    */
-  curvature?: Float32Array;
+  curvature?: Floats;
   /**
    * If asked for, the surface that each point belongs to: its place among `report.components.largest`, 0 for the largest, and
    * so on beyond the end of that list; 4294967295 for unresolved points, and for strays too far from the others to count.
    */
-  components?: Uint32Array;
+  components?: Wholes;
   report: Report;
 }
 
@@ -131,16 +136,17 @@ export interface Report {
   peakBytes: number;
 }
 
-export interface PointCloud {
+/** With types of arrays: those that come from `readPointCloud` own plain memory, those for `writePly` may be any. */
+export interface PointCloud<F extends Float32Array = Floats, B extends Uint8Array = Bytes> {
   count: number;
   /** Relative to `origin`: add it to get the file's coordinates. */
-  positions: Float32Array;
+  positions: F;
   /** `[0, 0, 0]` unless the file's coordinates need more digits than single precision has. */
   origin: [number, number, number];
-  normals?: Float32Array;
+  normals?: F;
   /** Red, green, blue, alpha of each point. */
-  colors?: Uint8Array;
-  intensity?: Float32Array;
+  colors?: B;
+  intensity?: F;
   source: {
     format: string;
     properties: string[];
@@ -205,7 +211,7 @@ export interface Features {
 export interface Estimator {
   estimateNormals(positions: Positions, options?: EstimateOptions): Promise<EstimateResult>;
   readPointCloud(source: Source, options?: ReadOptions): Promise<PointCloud>;
-  writePly(cloud: PointCloud | Source, add: Additions, options?: WriteOptions): Promise<Blob>;
+  writePly(cloud: PointCloud<Float32Array, Uint8Array> | Source, add: Additions, options?: WriteOptions): Promise<Blob>;
   features(): Promise<Features>;
   /** Ends the workers and their threads; calls that wait or run, and later ones, reject; of downloads, when they have ended. */
   dispose(): void;

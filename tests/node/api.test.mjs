@@ -151,6 +151,12 @@ test('one thread, two, three and four give the same bits', async (context) => {
     assert.ok(!('fallbackReason' in report));
     first ??= normals;
     assert.ok(sameBits(normals, first), `${threads} threads`);
+    // As their types promise, also where the module's memory is shared.
+    const all = { orient: 'consistent', curvature: true, components: true };
+    const results = await estimator.estimateNormals(Float64Array.from(positions), all);
+    for (const { buffer } of [normals, results.normals, results.curvature, results.components]) {
+      assert.ok(buffer instanceof ArrayBuffer);
+    }
   }
 });
 

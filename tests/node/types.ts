@@ -34,6 +34,11 @@ export async function documented(file: File, response: Response): Promise<Blob> 
     await readPointCloud(source, { signal: new AbortController().signal, onProgress: console.log, maxPoints: 10 });
   }
   await writePly(cloud, { normals, curvature: new Float32Array(cloud.count) });
+  // Results own plain memory, whatever TypeScript calls it.
+  const parts: BlobPart[] = [normals, cloud.positions, cloud.colors ?? '', cloud.intensity ?? '', cloud.normals ?? ''];
+  console.log(new Blob(parts));
+  const shared: Float32Array = new Float32Array(new SharedArrayBuffer(12));
+  await writePly({ ...cloud, positions: shared, count: 1 }, { normals: shared });
   return writePly(file, { normals }, { format: 'ascii' });
 }
 
@@ -59,6 +64,7 @@ export async function options(positions: Positions): Promise<void> {
       console.log(report.components?.count, points, side satisfies string, confidence, components?.indexOf(0));
     }
     await estimator.writePly(new Blob(), { normals, curvature });
+    console.log(new Blob([normals, curvature ?? '', components ?? '']));
   }
   const found: Features = await estimator.features();
   console.log(found.threads, found.simd, found.crossOriginIsolated, found.reason, await features());
