@@ -3,7 +3,7 @@
 // Everything that is told goes to standard error: standard output belongs to results.
 
 import { execFileSync, spawnSync } from 'node:child_process';
-import { readFileSync } from 'node:fs';
+import { existsSync, readFileSync, realpathSync } from 'node:fs';
 import { delimiter, join, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
@@ -99,5 +99,6 @@ export async function main(job) {
   }
 }
 
-/** Whether this module is the one that was started. */
-export const started = (meta) => process.argv[1] === fileURLToPath(meta.url);
+/** Whether this module is the one that was started, be it through a link. */
+export const started = (meta) =>
+  existsSync(process.argv[1] ?? '') && realpathSync(process.argv[1]) === realpathSync(fileURLToPath(meta.url));

@@ -108,20 +108,19 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
     const { simd, reason } = detect();
     if (!simd) throw new BilinormalError('unsupported', reason!);
     let answered = false;
+    const failure = (reason: string) =>
+      answered
+        ? new BilinormalError('limit', `wasm broke, most likely for want of memory (${reason})`)
+        : new BilinormalError('unsupported', `the worker did not start: ${reason}`);
     const fail = (reason: string) => {
-      if (mine !== link) return;
-      crash(
-        answered
-          ? new BilinormalError('limit', `wasm broke, most likely for want of memory (${reason})`)
-          : new BilinormalError('unsupported', `the worker did not start: ${reason}`),
-      );
+      if (mine === link) crash(failure(reason));
     };
     const name = `${Math.random()}`;
     channel = new BroadcastChannel(name);
     channel.onmessage = (event) => fail(event.data);
     // Node: a channel alone does not keep the process alive.
     (channel as { unref?(): void }).unref?.();
-    const mine = host.startWorker((reply: Reply) => {
+    const receive = (reply: Reply) => {
       answered = true;
       if (mine !== link || !running) return;
       if ('result' in reply) finish('resolve', reply.result);
@@ -132,7 +131,14 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
         if (fatal) endWorker();
         finish('reject', new BilinormalError(code, message, details));
       }
-    }, fail);
+    };
+    let mine: Link;
+    try {
+      mine = host.startWorker(receive, fail);
+    } catch (error) {
+      // The page's policy may forbid it.
+      throw failure((error as Error).message);
+    }
     mine.post({ ...options, kind: 'start', channel: name, reason });
     return mine;
   }
@@ -144,9 +150,16 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
     want((onProgress ?? want).call, 'onProgress', onProgress, 'a function');
     signal?.throwIfAborted();
     let told = 0;
+    let thrown: [unknown] | undefined;
     const tell = (phase: string, fraction: number) => {
       told = Math.max(told, fraction);
-      onProgress?.({ phase, fraction: told });
+      try {
+        onProgress?.({ phase, fraction: told });
+      } catch (error) {
+        // A stream that it passes through makes another of it.
+        thrown = [error];
+        throw error;
+      }
     };
     let abort!: () => void;
     try {
@@ -172,7 +185,7 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
       tell('done', 1);
       return result;
     } catch (error) {
-      throw signal?.aborted ? signal.reason : error;
+      throw signal?.aborted ? signal.reason : thrown ? thrown[0] : error;
     } finally {
       signal?.removeEventListener('abort', abort);
     }
@@ -205,11 +218,13 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
         want(/^Float(32|64)Array$/.test(kind), 'positions', positions, 'a Float32Array or Float64Array');
         const { length } = positions;
         want(length % 3 === 0, 'the length of positions', length, 'a multiple of 3, x y z of each point');
-        const { transfer, signal, onProgress, ...rest } = options;
+        // By name, for they may be inherited; whatever else there is, the worker refuses.
+        const { transfer, signal, onProgress, method, cell, k, orient, curvature, components, ...rest } = options;
+        const named = { ...rest, method, cell, k, orient, curvature, components };
         return {
           kind: 'estimate',
           // What waits in the queue must not change, and a proxy of a framework cannot be posted.
-          options: JSON.parse(JSON.stringify(rest, keepNumbers)),
+          options: JSON.parse(JSON.stringify(named, keepNumbers)),
           double: kind > 'Float5',
           positions: own(positions, transfer),
         };
@@ -231,6 +246,8 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
         const normals = pack('normals', add?.normals);
         if (!(Object(cloud) === cloud && 'positions' in cloud))
           return { kind: 'write', normals, curvature, ascii, file: await resolve(cloud, host.files, tell, signal) };
+        const comments = [...(cloud.source?.comments ?? [])];
+        for (const comment of comments) want(typeof comment === 'string', 'a comment', comment, 'a string');
         return {
           kind: 'writeCloud',
           positions: pack('positions', cloud.positions ?? null)!,
@@ -239,7 +256,7 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
           colors: pack('colors', cloud.colors, 'Uint8Array'),
           intensity: pack('intensity', cloud.intensity),
           curvature,
-          comments: [...(cloud.source?.comments ?? [])],
+          comments,
           ascii,
         };
       }),

@@ -112,6 +112,18 @@ test('plain files on the own origin', async () => {
   assert.equal(plain.hash, hash, 'both builds give the same bits');
 });
 
+test('a page whose policy forbids the worker is told so', async () => {
+  const page = await browser.newPage();
+  await page.goto(await open(project, { 'Content-Security-Policy': "require-trusted-types-for 'script'" }));
+  await page.waitForFunction(() => window.bilinormal, undefined, { timeout: 10000 });
+  const [code, message] = await page.evaluate(() =>
+    window.bilinormal.estimateNormals(new Float32Array(3)).catch(({ code, message }) => [code, message]),
+  );
+  assert.equal(code, 'unsupported');
+  assert.match(message, /the worker did not start: .*TrustedScriptURL/);
+  await page.close();
+});
+
 test('files on another origin', async () => {
   const elsewhere = await open(join(home, 'dist'), anyOrigin);
   const folder = join(project, 'page');

@@ -360,6 +360,11 @@ test('no points, no normals', async () => {
   assert.equal(report.points, 0);
 });
 
+test('options may be inherited', async () => {
+  const { report } = await estimateNormals(sphere(1000), Object.create({ cell: { size: 0.25 } }));
+  assert.equal(report.cellSize, 0.25);
+});
+
 test('wrong arguments are input errors that say what came and what was wanted', async (context) => {
   const positions = sphere(10);
   const locked = new Response('ply');
@@ -382,6 +387,7 @@ test('wrong arguments are input errors that say what came and what was wanted', 
     [() => writePly({ count: 10, positions }, { normals: [0, 0, 1] }), /normals is Array\(3\); wanted a Float32Array/],
     [() => writePly({ count: 10, positions }, { normals: new Float32Array(3) }), /normals.*wanted/],
     [() => writePly({ count: 10, positions, colors: new Uint8Array(3) }, {}), /colors.*wanted/],
+    [() => writePly({ count: 10, positions, source: { comments: ['a', 5] } }, {}), /a comment is 5; wanted a string/],
     [() => writePly({ count: 10, positions }, {}, { format: 'obj' }), /format is 'obj'; wanted/],
     [() => estimateNormals(positions, null), /options is null; wanted an object/],
     [() => estimateNormals(positions, { cel: { scale: 2 } }), /option 'cel' is unknown; wanted any of method, cell/],
@@ -558,6 +564,14 @@ test('a download tells its progress, and can be aborted', async () => {
   });
   await assert.rejects(call, (reason) => reason === 'enough');
   assert.deepEqual(told[0], { phase: 'download', fraction: 0 });
+  for (const first of [0, 0.25]) {
+    const oops = new TypeError('oops');
+    const onProgress = ({ fraction }) => {
+      if (fraction === first) throw oops;
+    };
+    const thrown = readPointCloud(new URL(`http://127.0.0.1:${server.address().port}/`), { onProgress });
+    await assert.rejects(thrown, (error) => error === oops);
+  }
 });
 
 test('a file tells where the scanner stood', async () => {
