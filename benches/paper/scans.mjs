@@ -9,17 +9,17 @@ const KNOWN = {
   las_ahn3_cropped: {
     about: 'aerial lidar; AHN3, CC0',
     title: 'a village from the air',
-    view: { size: [640, 420], closer: 1.15, pointSize: 0.6 },
+    view: { size: [640, 420], closer: 1.15 },
   },
   las_indoor: {
     about: 'rooms, lidar; loaders.gl, MIT',
     title: 'rooms, from outside',
-    view: { closer: 1.1, pointSize: 0.7 },
+    view: { closer: 1.1 },
   },
   las_autzen_trim: {
     about: 'aerial lidar; PDAL, BSD',
     title: 'a river and woods from the air',
-    view: { closer: 1.1, pointSize: 0.5 },
+    view: { closer: 1.1 },
   },
   stanford_bunny_ranges_merged_normals: {
     about: 'ten range scans of the Stanford bunny; Stanford Computer Graphics Laboratory',
@@ -29,14 +29,14 @@ const KNOWN = {
   potree_lion_takanawa_normals_be: {
     about: 'photogrammetry of a statue; potree, BSD',
     title: 'a lion',
-    view: { up: 'z', closer: 1.4, pointSize: 0.6 },
+    view: { up: 'z', closer: 1.4 },
   },
   igea: { about: 'vertices of a scanned head; Cyberware, from common-3d-test-models' },
   cilantro_frame_1: { about: 'a frame of a depth camera; cilantro, MIT' },
   cgal_building: {
     about: 'a building; CGAL',
     title: 'a building',
-    view: { up: 'z', turn: [-50, 0], closer: 1.1, pointSize: 0.8 },
+    view: { up: 'z', turn: [-50, 0], closer: 1.1 },
   },
 };
 

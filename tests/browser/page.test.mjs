@@ -554,6 +554,23 @@ test('what is told of a cloud covers no part of it, whatever its shape', async (
   }
 });
 
+test('points are as large as the gaps between them, however far the cloud reaches', async () => {
+  page = await browser.openPage(browser.isolated);
+  const centres = [
+    [-20, 0, 0],
+    [20, 0, 0],
+  ];
+  await drop(page, 'balls.ply', spherePly(20_000, { centres }));
+  await result(page, 'balls.ply');
+  await page.getByRole('button', { name: 'Flip all' }).click();
+  const area = () => backsShown(page, { side: 780 });
+  const shown = await area();
+  // Both balls are so small that points of the least size close them, too.
+  await page.getByRole('slider', { name: 'Point size' }).fill('-2');
+  const least = await area();
+  assert.ok(shown < 1.4 * least, `${shown} of the view after ${least}`);
+});
+
 test('a cloud in any unit is lit, moved and picked alike', async () => {
   page = await browser.openPage(browser.isolated);
   for (const radius of [1e-19, 1e-3, 1e19]) {

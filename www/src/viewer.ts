@@ -15,6 +15,8 @@ import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { createPointMaterial, type Shading as MaterialShading } from 'bilinormal/three';
 import type { Bounds } from './bounds';
 import { pickPoint } from './pick';
+import { spacingOf } from './spacing';
+import { spread } from './spread';
 
 export type Shading = MaterialShading | 'curvature';
 /** An axis of the file, or the opposite of one. */
@@ -70,7 +72,9 @@ const FAST_FRAME = 20;
 const SLOW_FRAME = 36;
 /** Time without movement after which the whole cloud is drawn. */
 const STILL = 140;
-/** Most that a point measures without a choice of its size, where the bulk of the cloud has radius 1. */
+/** Points without order need this many times the spacing of an even pattern to close a surface. */
+const CLOSING = 2.2;
+/** Most that a point measures without a choice of its size, where the bulk of the cloud has radius 1: a few are dots. */
 const LARGEST = 0.2;
 
 export function createViewer(canvas: HTMLCanvasElement): Viewer {
@@ -101,6 +105,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   let bounds: Bounds | undefined;
   /** How far the cloud reaches in the world. */
   let reach = 1;
+  /** What a point of it measures there to close its surface. */
+  let closing = 0;
   let whole = points.geometry;
   let sparse: BufferGeometry | undefined;
   /** One of these two is the attribute `color`. */
@@ -171,10 +177,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   /** Size of a point in world units, and larger where a part of the cloud has to stand for the whole. */
   function setSize(drawn: number): void {
     if (!cloud) return;
-    // The surface of a scan has about as much area as the sphere round it; points without order need 2.2 times the
-    // spacing of an even pattern to close it. A few points are dots, not a surface.
-    const spacing = 2.2 * Math.sqrt((4 * Math.PI) / Math.max(1, cloud.positions.length / 3));
-    material.size = pointSize * Math.min(spacing, LARGEST) * Math.min(2, Math.sqrt(1 / drawn));
+    material.size = pointSize * closing * Math.min(2, Math.sqrt(1 / drawn));
   }
 
   /** New values of an attribute, in the buffer that it has on the graphics card. */
@@ -355,6 +358,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       points.visible = true;
       turned.scale.setScalar(1 / bounds.radius);
       reach = bounds.reach / bounds.radius;
+      closing = Math.min((CLOSING * spacingOf(next.positions)) / bounds.radius, LARGEST);
       points.position.set(-bounds.centre[0], -bounds.centre[1], -bounds.centre[2]);
       chooseShading();
       turn(up);
@@ -403,25 +407,4 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     },
   };
   return viewer;
-}
-
-/**
- * The first `count` indices of a fixed order of `all` points in which every beginning is spread evenly over the whole:
- * steps of the golden ratio. Files are mostly in scan order, so that a plain beginning would be one corner of the scan.
- */
-function spread(all: number, count: number): Uint32Array {
-  let step = Math.round(all * 0.618034);
-  while (gcd(step, all) !== 1) step++;
-  const order = new Uint32Array(count);
-  for (let i = 0, at = 0; i < count; i++) {
-    order[i] = at;
-    at += step;
-    if (at >= all) at -= all;
-  }
-  return order;
-}
-
-function gcd(a: number, b: number): number {
-  while (b !== 0) [a, b] = [b, a % b];
-  return a;
 }
