@@ -833,6 +833,40 @@ test('a narrow screen shows everything without scrolling sideways', async () => 
   await page.screenshot({ path: join(ARTEFACTS, 'narrow-panel.png') });
 });
 
+test('on a phone the cloud is seen below the open panel, and fingers meet what they press', async () => {
+  for (const [width, height] of [
+    [390, 844],
+    [844, 390],
+  ]) {
+    page = await browser.openPage(browser.isolated, { viewport: { width, height }, hasTouch: true, isMobile: true });
+    await drop(page, 'ball.ply', spherePly(20_000));
+    await result(page, 'ball.ply');
+    const panel = page.locator('#panel');
+    if (width < height) await page.locator('#panel > summary').tap();
+    await page.getByRole('button', { name: 'Flip all' }).tap();
+    const sizes = await page.evaluate(() =>
+      [...document.querySelectorAll('button, input, select, summary')]
+        .filter((control) => control.checkVisibility())
+        .map((control) => (control.closest('label:not(.line)') ?? control).getBoundingClientRect())
+        .map(({ width, height }) => Math.round(Math.min(width, height))),
+    );
+    assert.ok(sizes.length > 15 && Math.min(...sizes) >= 44, String(sizes));
+    const hideAndCount = async (box) => {
+      const clip = await page.locator(box).boundingBox();
+      await page.evaluate((box) => (document.querySelector(box).style.visibility = 'hidden'), box);
+      return backsShown(page, { clip });
+    };
+    // A surface is flipped with the panel out of the way, and the hint takes the place of the result.
+    await page.getByRole('button', { name: 'Flip one' }).tap();
+    assert.equal(await hideAndCount('#hint'), 0, 'the hint covers nothing');
+    await page.evaluate(() => (document.querySelector('#panel').open = true));
+    assert.ok((await backsShown(page, { clip: { x: 0, y: 0, width, height } })) > 0.05, 'the cloud is seen');
+    assert.ok((await panel.boundingBox()).height < (width < height ? 0.5 : 1) * height);
+    assert.equal(await hideAndCount('#panel'), 0, 'the panel covers nothing');
+    await page.close();
+  }
+});
+
 test('a low window shows both buttons, and all that was measured by scrolling', async () => {
   for (const [width, height] of [
     [740, 360],

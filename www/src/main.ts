@@ -34,7 +34,7 @@ function start(viewer: Viewer): void {
   const low = matchMedia('(max-height: 520px)');
   const makeRoom = () => viewer.setMargins(marginsOf(small.matches, low.matches));
   const turnSurfaces = (turning: boolean) => {
-    // Without back faces both sides look the same, and on a small screen the panel hides the cloud.
+    // Without back faces both sides look the same, and on a small screen the panel takes half of the room.
     store.set(turning ? { turning, backs: true } : { turning });
     if (!turning) return;
     if (small.matches) panel.open = false;
@@ -86,7 +86,7 @@ function start(viewer: Viewer): void {
   takeControls(session, viewer);
   takeTurns(session, viewer);
 
-  // On a small screen the panel would hide the cloud: it starts closed there.
+  // On a small screen the panel would take half of the room: it starts closed there.
   panel.open = !small.matches;
   small.addEventListener('change', () => {
     const focused = panel.contains(document.activeElement);
@@ -95,6 +95,7 @@ function start(viewer: Viewer): void {
     makeRoom();
   });
   low.addEventListener('change', makeRoom);
+  panel.addEventListener('toggle', makeRoom);
   let named: string | undefined;
   store.listen(({ scan }) => {
     if (scan?.name === named) return;
@@ -108,17 +109,16 @@ function start(viewer: Viewer): void {
 }
 
 /** What the status line takes, in pixels (style.css), with the facts of most scans; a low window does without these. */
-const STATUS = { width: 396, height: 200, low: 120 };
+const STATUS = { width: 396, height: 212, low: 120 };
 
 /**
  * What the panel and the status line cover, for a cloud beside that line or above it; on a small screen for one between the
- * panel's title and that line.
+ * panel and that line, which the open panel replaces.
  */
 function marginsOf(small: boolean, low: boolean): Margins[] {
-  const { offsetWidth: width, offsetTop: gap } = element('#panel');
-  const title = element('#panel > summary').offsetHeight;
+  const { offsetWidth: width, offsetHeight: height, offsetTop: gap, open } = element<HTMLDetailsElement>('#panel');
   const bottom = low ? STATUS.low : STATUS.height;
-  if (small) return [{ top: title + gap, right: 0, bottom, left: 0 }];
+  if (small) return [{ top: height + gap, right: 0, bottom: open ? 0 : bottom, left: 0 }];
   const right = width + gap;
   return [
     { top: 0, right, bottom: 0, left: STATUS.width },
