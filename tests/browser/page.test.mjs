@@ -328,6 +328,7 @@ test('curvature is computed to be shown, for the normals that are there, and sav
   assert.equal(readSaved((await save(page)).bytes).length, 6 * 20_000);
 });
 
+const upAxis = () => page.getByRole('combobox', { name: 'Up' });
 const orientation = (name) => page.getByRole('group', { name: 'Orientation' }).getByRole('radio', { name });
 
 /** Computes again with an orientation; the points and normals that are saved then, and what the status line says. */
@@ -365,19 +366,25 @@ test('normals are saved with the signs of the orientation that was chosen', asyn
     assert.match(facts, /1 surface\s+100% in the largest\s+outwards with confidence (1\.00|0\.[89]\d)/);
   }
   // Across the axis the sign is free, and a normal of the sphere is off by a degree at the most.
+  await page.getByRole('checkbox', { name: 'Back faces' }).check();
   const rising = (axis, sign) => (_, normal) => sign * normal[axis] + 0.001;
   for (const [up, axis, sign] of [
+    ['X', 0, 1],
+    ['−X', 0, -1],
     ['Y', 1, 1],
     ['−Y', 1, -1],
+    ['−Z', 2, -1],
     ['Z', 2, 1],
   ]) {
-    await page.getByRole('radio', { name: up, exact: true }).check();
+    await upAxis().selectOption({ label: up });
     const { facts, saved } = await oriented('Upwards');
     assert.equal(shareOf(saved, rising(axis, sign)), 1, up);
     assert.match(facts, new RegExp(`upwards\\s+along ${up}`));
+    // The top of the ball is shown at the top.
+    assert.ok((await backsShown(page, { y: 250, side: 100 })) < 0.01, up);
     assert.doesNotMatch(facts, /surface/);
   }
-  await page.getByRole('radio', { name: 'Y', exact: true }).check();
+  await upAxis().selectOption('y');
   assert.match(await page.locator('#facts').innerText(), /along Z/, 'as it was computed');
 });
 
@@ -387,7 +394,7 @@ test('towards the camera no back faces show, wherever it is, and after a flip th
   // So that a camera in the coordinates of the view, which has its middle in the ball, would be on the other side.
   await drop(page, 'ball.ply', spherePly(20_000, { centres: [[-10, 4, -3]] }));
   await result(page, 'ball.ply');
-  await page.getByRole('radio', { name: 'Z', exact: true }).check();
+  await upAxis().selectOption('z');
   await page.mouse.move(400, 400);
   await page.mouse.down();
   await page.mouse.move(640, 250, { steps: 3 });
@@ -483,7 +490,7 @@ test('settings that were not computed with are told from those that were', async
   // The axis now decides; the shading does not.
   await page.getByRole('radio', { name: 'Normals' }).check();
   assert.ok(await note.isHidden());
-  await page.getByRole('radio', { name: 'Z', exact: true }).check();
+  await upAxis().selectOption('z');
   assert.ok(await note.isVisible());
 });
 
@@ -978,13 +985,13 @@ test('while WebGL is stopped the page says so, and then it draws again', async (
 test('what a depth camera saw stands upright', async () => {
   page = await browser.openPage(browser.isolated);
   for (const [name, ahead, up] of [
-    ['thing.ply', 0, 'Y'],
-    ['frame.ply', 3, '−Y'],
-    ['behind.ply', -3, 'Y'],
+    ['thing.ply', 0, 'y'],
+    ['frame.ply', 3, '-y'],
+    ['behind.ply', -3, 'y'],
   ]) {
     await drop(page, name, spherePly(5_000, { centres: [[0.2, -0.1, ahead]] }));
     await result(page, name);
-    assert.ok(await page.getByRole('radio', { name: up, exact: true }).isChecked(), name);
+    assert.equal(await upAxis().inputValue(), up, name);
   }
 });
 
@@ -995,7 +1002,7 @@ test('a real aerial scan of 849 thousand points', { skip: !existsSync(AERIAL) &&
   const shown = await result(page, 'aerial.ply');
   assert.equal(shown.error, undefined);
   assert.match(shown.headline, /848,942 points/);
-  assert.ok(await page.getByRole('radio', { name: 'Z', exact: true }).isChecked(), 'surveys are z-up');
+  assert.equal(await upAxis().inputValue(), 'z', 'surveys are z-up');
   assert.ok((await colorsShown(page)) > 20);
   await page.screenshot({ path: join(ARTEFACTS, 'aerial-shaded.png') });
 });

@@ -195,12 +195,13 @@ function takeControls(session: Session, viewer: Viewer): void {
     if (value === 'curvature') void session.addCurvature();
   });
   choose('orient', (value) => store.set({ orientKind: value as OrientKind }));
-  choose('up', (value) => store.set({ up: value as Up }));
   choose('method', (value) => store.set({ method: value as Method, kText: String(METHODS[value as Method].k) }));
   choose('cell', (value) => chooseCell(store, value as CellKind));
 
   const backs = element<HTMLInputElement>('#backs');
   backs.addEventListener('change', () => store.set({ backs: backs.checked }));
+  const up = element<HTMLSelectElement>('#up');
+  up.addEventListener('change', () => store.set({ up: up.value as Up }));
   const size = element<HTMLInputElement>('#point-size');
   size.addEventListener('input', () => {
     const pointSize = 2 ** size.valueAsNumber;

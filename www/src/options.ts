@@ -55,7 +55,14 @@ export function parseOptions({ method, cellKind, cellText, kText }: OptionsForm)
   return { problem: 'An edge length is a number above 0, in the unit of the file.' };
 }
 
-const UPWARDS: Record<Up, Place> = { y: [0, 1, 0], z: [0, 0, 1], '-y': [0, -1, 0] };
+const UPWARDS: Record<Up, Place> = {
+  x: [1, 0, 0],
+  '-x': [-1, 0, 0],
+  y: [0, 1, 0],
+  '-y': [0, -1, 0],
+  z: [0, 0, 1],
+  '-z': [0, 0, -1],
+};
 
 /** The chosen orientation, for a cloud with this axis upwards that is seen from `eye` and was scanned from `scanner`. */
 export function orientOf(kind: OrientKind, up: Up, eye: Place, scanner: Place | undefined): Orient {

@@ -53,7 +53,7 @@ export function showState(store: Store): void {
     name.textContent = name.title = scan?.name ?? 'bilinormal';
     document.title = scan ? `${scan.name}, bilinormal` : title;
     check('shading', state.shading);
-    check('up', state.up);
+    element<HTMLSelectElement>('#up').value = state.up;
     radio('shading', 'colors').disabled = !scan?.hasColors;
     radio('shading', 'shaded').disabled = radio('shading', 'normals').disabled = !scan?.hasNormals && !busy;
     // To choose it may start a job, which must not end the one that runs.
@@ -223,8 +223,9 @@ function signsOf({ components, points }: Report, { scan, used, flipped, turnedSu
   }
   if (typeof used?.orient !== 'object') return [];
   if ('up' in used.orient) {
-    const [, y, z] = used.orient.up;
-    return [fact(flipped ? 'downwards' : 'upwards', `along ${z ? 'Z' : y < 0 ? '−Y' : 'Y'}`)];
+    const { up } = used.orient;
+    const axis = up.findIndex((value) => value !== 0);
+    return [fact(flipped ? 'downwards' : 'upwards', `along ${up[axis]! < 0 ? '−' : ''}${'XYZ'[axis]}`)];
   }
   const way = flipped ? 'away from' : 'towards';
   if (used.orient.viewpoint === scan?.scanner) return [fact(`${way} the scanner`, 'as the file says')];

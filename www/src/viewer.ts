@@ -20,7 +20,7 @@ import { spread } from './spread';
 
 export type Shading = MaterialShading | 'curvature';
 /** An axis of the file, or the opposite of one. */
-export type Up = 'y' | 'z' | '-y';
+export type Up = 'x' | '-x' | 'y' | '-y' | 'z' | '-z';
 
 export interface Cloud {
   /** x0 y0 z0 x1 ...; points that are not finite are not drawn. */
@@ -208,7 +208,9 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
 
   /** Turns the axis of the file upwards. */
   function turn(up: Up): void {
-    turned.rotation.x = { y: 0, z: -Math.PI / 2, '-y': Math.PI }[up];
+    const right = Math.PI / 2;
+    turned.rotation.x = { x: 0, '-x': 0, y: 0, '-y': Math.PI, z: -right, '-z': right }[up];
+    turned.rotation.z = up === 'x' ? right : up === '-x' ? -right : 0;
   }
 
   function fit(): void {
