@@ -508,15 +508,32 @@ test('the focus of the keyboard goes where the work goes', async () => {
   assert.ok(await page.locator('#error').isHidden());
 });
 
-test('normals that the file had are not those that are shown', async () => {
+test('normals that the file had are compared with the computed ones, and shown in their place', async () => {
   page = await browser.openPage(browser.isolated);
   await drop(page, 'ball.ply', spherePly(5_000));
   await result(page, 'ball.ply');
-  assert.doesNotMatch(await page.locator('#facts').innerText(), /of the file/);
+  const facts = () => page.locator('#facts').innerText();
+  assert.doesNotMatch(await facts(), /the file's/);
+  const fromFile = page.getByRole('radio', { name: 'From the file' });
+  assert.ok(await fromFile.isHidden());
+  // All along Z, the first without one: off those of a sphere by one radian in the mean, and half of them opposite.
   const { bytes } = await save(page);
+  const start = bytes.indexOf('end_header\n') + 'end_header\n'.length;
+  for (let at = start; at < bytes.length; at += 24) {
+    [0, 0, at > start ? 2 : NaN].forEach((value, axis) => bytes.writeFloatLE(value, at + 12 + 4 * axis));
+  }
   await drop(page, 'again.ply', bytes);
   await result(page, 'again.ply');
-  assert.match(await page.locator('#facts').innerText(), /new normals instead of those of the file/);
+  assert.match(await facts(), /57(\.\d)?° from the file's normals\s+(49|50|51)(\.\d)?% of these opposite/);
+
+  await page.getByRole('radio', { name: 'Normals', exact: true }).check();
+  const computed = await colorsShown(page);
+  await fromFile.check();
+  assert.ok((await colorsShown(page)) < computed / 10);
+  // What is flipped and saved is what was computed, and it is shown again.
+  await page.getByRole('button', { name: 'Flip all' }).click();
+  assert.ok(await page.getByRole('radio', { name: 'Computed' }).isChecked());
+  assert.ok((await colorsShown(page)) > computed / 2);
 });
 
 test('a file without a finite point is refused', async () => {

@@ -4,7 +4,7 @@ import { drawHero } from './hero';
 import { element, showState } from './panel';
 import { createSession, type Session } from './session';
 import { METHODS, type CellKind, type Method, type OrientKind } from './options';
-import { createStore, type Store } from './state';
+import { createStore, type NormalSource, type Store } from './state';
 import { missing } from './support';
 import { createViewer, type Margins, type Shading, type Up, type Viewer } from './viewer';
 
@@ -194,6 +194,7 @@ function takeControls(session: Session, viewer: Viewer): void {
     store.set({ shading: value as Shading });
     if (value === 'curvature') void session.addCurvature();
   });
+  choose('source', (value) => session.showNormals(value as NormalSource));
   choose('orient', (value) => store.set({ orientKind: value as OrientKind }));
   choose('method', (value) => store.set({ method: value as Method, kText: String(METHODS[value as Method].k) }));
   choose('cell', (value) => chooseCell(store, value as CellKind));

@@ -1,5 +1,6 @@
 // Draws the state into the document. What was drawn last is kept only to leave alone what is the same, and to tell changes.
 import type { Report } from 'bilinormal';
+import type { Comparison } from './compare';
 import { count, duration, measure, percent, phaseName, plural } from './format';
 import { METHODS, askedBy, hasSurfaces, parseOptions } from './options';
 import type { State, Store } from './state';
@@ -53,6 +54,9 @@ export function showState(store: Store): void {
     name.textContent = name.title = scan?.name ?? 'bilinormal';
     document.title = scan ? `${scan.name}, bilinormal` : title;
     check('shading', state.shading);
+    check('source', state.source);
+    element('#source').hidden = !scan?.hadNormals;
+    element<HTMLFieldSetElement>('#source').disabled = !scan?.hasNormals || busy;
     element<HTMLSelectElement>('#up').value = state.up;
     radio('shading', 'colors').disabled = !scan?.hasColors;
     radio('shading', 'shaded').disabled = radio('shading', 'normals').disabled = !scan?.hasNormals && !busy;
@@ -232,6 +236,16 @@ function signsOf({ components, points }: Report, { scan, used, flipped, turnedSu
   return [fact(`${way} the camera`, 'as it was')];
 }
 
+/** Between the computed normals and those that the file brought. */
+function differences({ degrees, opposite, compared }: Comparison): HTMLElement[] {
+  if (compared === 0) return [];
+  const about = 'The mean angle between the computed normals and those that the file brought, whatever their signs';
+  return [
+    fact(`${measure(Math.round(10 * degrees) / 10)}°`, "from the file's normals", about),
+    fact(percent(opposite, compared), 'of these opposite', 'Pointing to the other side of the surface'),
+  ];
+}
+
 /** What is the same is left alone, or it would be read out again. */
 function write(selector: string, text: string): void {
   const to = element(selector);
@@ -239,7 +253,7 @@ function write(selector: string, text: string): void {
 }
 
 function showResult(state: State): void {
-  const { scan, report, used } = state;
+  const { scan, report, used, comparison } = state;
   element('#status').hidden = scan === undefined;
   if (!scan) return;
   write('#total', report ? duration(report.milliseconds.total) : count(scan.points));
@@ -262,7 +276,7 @@ function showResult(state: State): void {
     ...signsOf(report, state),
     fact(count(report.unresolved), 'without a normal'),
     counted(report.threads, 'thread'),
-    ...(scan.hadNormals ? [fact('new normals', 'instead of those of the file')] : []),
+    ...(comparison ? differences(comparison) : []),
   );
   facts.dataset['mode'] = report.mode;
 

@@ -3,9 +3,10 @@
 import { estimateNormals, readPointCloud, writePly, type EstimateOptions } from 'bilinormal';
 import { scannerOf } from '../../src/js/scanner';
 import { boundsOf, guessUp } from './bounds';
+import { compare } from './compare';
 import { METHODS, askedBy, hasSurfaces, orientOf, parseOptions } from './options';
 import { colorsOf } from './ramp';
-import { UNTURNED, type Store, type Turned } from './state';
+import { UNTURNED, type NormalSource, type State, type Store, type Turned } from './state';
 import type { Viewer } from './viewer';
 import { warmingCloud } from './warming';
 
@@ -18,6 +19,8 @@ export interface Session {
   estimate(): Promise<void>;
   /** Sees to it that the curvature is there, if the normals are: of the same neighbourhoods. */
   addCurvature(): Promise<void>;
+  /** Shows these normals, until the computed ones change. */
+  showNormals(source: NormalSource): void;
   /** Turns all normals round, those on the screen and so those that are saved. */
   flip(): void;
   /** Turns those of the surface round that a point belongs to. */
@@ -34,6 +37,8 @@ const NO_SURFACE = 0xffff_ffff;
 interface Shown {
   file: File;
   positions: Float32Array;
+  /** Those that the file brought. */
+  normals: Float32Array | undefined;
   result?: { normals: Float32Array; curvature?: Float32Array; components?: Uint32Array };
   /** What the result was computed with. */
   options?: EstimateOptions;
@@ -90,7 +95,9 @@ export function createSession(store: Store, viewer: Viewer): Session {
     const up = guessUp(bounds, cloud.origin);
     const hasColors = cloud.colors !== undefined;
     const shading = store.state.shading === 'colors' && !hasColors ? 'shaded' : store.state.shading;
-    shown = { file, positions: cloud.positions };
+    // Gaussian splats bring zeros.
+    const normals = cloud.normals?.some((value) => value !== 0) ? cloud.normals : undefined;
+    shown = { file, positions: cloud.positions, normals };
     viewer.show(cloud, bounds, up);
     const scan = {
       name: file.name,
@@ -100,7 +107,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
       hasCurvature: false,
       scanner: scannerOf(cloud),
       readMilliseconds,
-      hadNormals: cloud.normals !== undefined,
+      hadNormals: normals !== undefined,
     };
     const { orientKind } = store.state;
     // An edge length belongs to the unit of the file before.
@@ -109,6 +116,8 @@ export function createSession(store: Store, viewer: Viewer): Session {
       report: undefined,
       used: undefined,
       ...UNTURNED,
+      comparison: undefined,
+      source: 'computed',
       turning: false,
       up,
       shading,
@@ -148,7 +157,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
     viewer.setNormals(result.normals, result.curvature && colorsOf(result.curvature));
     const hasCurvature = result.curvature !== undefined;
     const used = { method, k, orient, asked };
-    store.set({ scan: { ...scan, hasNormals: true, hasCurvature }, report, used, ...turned });
+    store.set({ scan: { ...scan, hasNormals: true, hasCurvature }, report, used, ...turned, ...compared(shown) });
   }
 
   return {
@@ -188,24 +197,31 @@ export function createSession(store: Store, viewer: Viewer): Session {
       await run('Computing curvature', (step) => shadeBy(options, used.asked, { flipped, turnedSurfaces }, step));
     },
 
+    showNormals(source) {
+      const normals = source === 'file' ? shown?.normals : shown?.result?.normals;
+      if (!normals) return;
+      viewer.refreshNormals(normals);
+      store.set({ source });
+    },
+
     flip() {
       if (!shown?.result) return;
       negate(shown.result.normals);
-      viewer.refreshNormals();
+      viewer.refreshNormals(shown.result.normals);
       // Without back faces both sides look the same when shaded; normals as colours do not.
       const { flipped, backs, shading } = store.state;
-      store.set({ flipped: !flipped, backs: backs || shading === 'shaded' });
+      store.set({ flipped: !flipped, backs: backs || shading === 'shaded', ...compared(shown) });
     },
 
     flipSurface(point) {
       const { normals, components } = shown?.result ?? {};
       const surface = components?.[point];
-      if (!normals || surface === undefined || surface === NO_SURFACE) return;
+      if (!shown || !normals || surface === undefined || surface === NO_SURFACE) return;
       negate(normals, components, surface);
-      viewer.refreshNormals();
+      viewer.refreshNormals(normals);
       const turnedSurfaces = new Set(store.state.turnedSurfaces);
       if (!turnedSurfaces.delete(surface)) turnedSurfaces.add(surface);
-      store.set({ turnedSurfaces });
+      store.set({ turnedSurfaces, ...compared(shown) });
     },
 
     save: () =>
@@ -226,6 +242,11 @@ export function createSession(store: Store, viewer: Viewer): Session {
       end();
     },
   };
+}
+
+/** What to tell of computed normals once they are shown. */
+function compared({ normals, result }: Shown): Pick<State, 'comparison' | 'source'> {
+  return { comparison: normals && result && compare(result.normals, normals), source: 'computed' };
 }
 
 /** In place: all, or those of one surface. A zero stays as it is, without a sign. */

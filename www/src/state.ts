@@ -1,6 +1,7 @@
 // Everything the page shows besides the cloud itself, in one place. The session and the controls write it, `set` tells
 // the listeners, and the panel draws it: nothing reads the document to find out what is going on.
 import type { Report } from 'bilinormal';
+import type { Comparison } from './compare';
 import type { Method, OptionsForm, Orient } from './options';
 import type { Shading, Up } from './viewer';
 
@@ -14,7 +15,7 @@ export interface Scan {
   /** Where it was scanned from, if the file says so. */
   scanner: [number, number, number] | undefined;
   readMilliseconds: number;
-  /** Whether the file brought normals, which are not the ones that are shown. */
+  /** Whether the file brought normals. */
   hadNormals: boolean;
 }
 
@@ -24,6 +25,9 @@ export interface Job {
   phase: string;
   fraction: number | undefined;
 }
+
+/** Whose normals are shown; what is flipped and saved are the computed ones. */
+export type NormalSource = 'computed' | 'file';
 
 /** What was turned by hand, so that it points the other way than the report says. */
 export interface Turned {
@@ -46,9 +50,12 @@ export interface State extends OptionsForm, Turned {
   report: Report | undefined;
   /** What the report is about, and what the form asked for then. */
   used: { method: Method; k: number; orient: Orient; asked: string } | undefined;
+  /** Of the computed normals with those of the file. */
+  comparison: Comparison | undefined;
   job: Job | undefined;
   error: string | undefined;
   shading: Shading;
+  source: NormalSource;
   /** Whether what points away from the camera has a colour of its own. */
   backs: boolean;
   /** Whether a click turns the surface that it meets. */
@@ -72,9 +79,11 @@ export function createStore(): Store {
     report: undefined,
     used: undefined,
     ...UNTURNED,
+    comparison: undefined,
     job: undefined,
     error: undefined,
     shading: 'shaded',
+    source: 'computed',
     backs: false,
     turning: false,
     pointSize: 1,

@@ -34,8 +34,8 @@ export interface Viewer {
   show(cloud: Cloud, bounds: Bounds, up: Up): void;
   /** `curvatureColors` (RGBA) are what the shading of that name shows; without them it shows the normals. */
   setNormals(normals: Float32Array, curvatureColors?: Uint8Array): void;
-  /** Draws the normals that it was given last again, because their values have changed. */
-  refreshNormals(): void;
+  /** Draws other normals of the same cloud, or the same ones because their values have changed. */
+  refreshNormals(normals: Float32Array): void;
   setShading(shading: Shading): void;
   /** Whether what points away from the eye has a colour of its own, or looks as from the front. */
   setBacks(shown: boolean): void;
@@ -373,9 +373,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       chooseShading();
       request();
     },
-    refreshNormals() {
-      const normals = whole.getAttribute('normal');
-      if (normals) normals.needsUpdate = true;
+    refreshNormals(normals) {
+      setValues('normal', normals, 3);
       request();
     },
     setBacks(shown) {
