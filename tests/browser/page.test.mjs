@@ -676,9 +676,17 @@ test('a flip turns what is saved, again undoes it, and curvature keeps it', asyn
     before,
   );
 
-  // What is computed anew is as its orientation promises.
+  // The key takes back what the button has done, and no more.
   await flip.click();
-  assert.deepEqual((await oriented('Outward')).saved, before);
+  for (let presses = 1; presses <= 4; presses++) await page.keyboard.press('Control+z');
+  assert.equal(await flip.getAttribute('aria-pressed'), 'false');
+
+  // What is computed anew is as its orientation promises, and says so.
+  assert.doesNotMatch(await page.locator('#facts').innerText(), /were reset/);
+  await flip.click();
+  const { saved: anew, facts } = await oriented('Outward');
+  assert.deepEqual(anew, before);
+  assert.match(facts, /flips by hand were reset/);
   assert.equal(await flip.getAttribute('aria-pressed'), 'false');
 });
 
@@ -721,7 +729,7 @@ test('one surface is turned by a click, or by Enter in the middle of the view', 
   assert.deepEqual(bent, turned);
 
   await canvas.focus();
-  await page.keyboard.press('Enter');
+  await page.keyboard.press('Meta+z');
   const undone = readSaved((await save(page)).bytes, 'curvature').filter((_, i) => i % 7 < 6);
   assert.deepEqual(undone, before);
 

@@ -72,8 +72,12 @@ function start(viewer: Viewer): void {
       else store.set({ turning: false, error: undefined });
     }
     const typing = event.target instanceof HTMLInputElement && event.target.type === 'text';
-    if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (typing || event.altKey) return;
     const key = event.key.toLowerCase();
+    if (event.ctrlKey || event.metaKey) {
+      if (key === 'z' && !event.shiftKey && !store.state.job) session.undoFlip();
+      return;
+    }
     if (key === 'f') viewer.fit();
     // The box does nothing while it is disabled.
     if (key === 'b') element('#backs').click();
@@ -175,7 +179,7 @@ function takeTurns(session: Session, viewer: Viewer): void {
   });
   canvas.addEventListener('dblclick', () => {
     // Two clicks centre the view: what the first has turned is turned back.
-    if (turned >= 0) session.flipSurface(turned);
+    if (turned >= 0) session.undoFlip();
     turned = -1;
   });
   canvas.addEventListener('keydown', ({ key, repeat }) => {

@@ -276,6 +276,7 @@ function showResult(state: State): void {
     ...signsOf(report, state),
     fact(count(report.unresolved), 'without a normal'),
     counted(report.threads, 'thread'),
+    ...(state.wereReset ? [fact('flips by hand', 'were reset by Re-run')] : []),
     ...(comparison ? differences(comparison) : []),
   );
   facts.dataset['mode'] = report.mode;

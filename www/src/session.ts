@@ -25,6 +25,8 @@ export interface Session {
   flip(): void;
   /** Turns those of the surface round that a point belongs to. */
   flipSurface(point: number): void;
+  /** Takes back the last of these two that was not taken back. */
+  undoFlip(): void;
   save(): Promise<void>;
   cancel(): void;
 }
@@ -53,6 +55,8 @@ interface Step {
 export function createSession(store: Store, viewer: Viewer): Session {
   let current: AbortController | undefined;
   let shown: Shown | undefined;
+  /** What was flipped by hand, the last at the end: surfaces, and undefined for all. */
+  let flips: (number | undefined)[] = [];
 
   /** Runs one job to its end; what it throws becomes the message on the page, unless it was cancelled. */
   async function run(trouble: string, work: (step: Step) => Promise<void>): Promise<void> {
@@ -130,9 +134,11 @@ export function createSession(store: Store, viewer: Viewer): Session {
   async function shade(step: Step): Promise<void> {
     const parsed = parseOptions(store.state);
     if ('problem' in parsed) throw new Error(parsed.problem);
-    const { orientKind, up, scan } = store.state;
+    const { orientKind, up, scan, flipped, turnedSurfaces } = store.state;
     const orient = orientOf(orientKind, up, viewer.eye(), scan?.scanner);
-    await shadeBy({ ...parsed.options, orient }, askedBy(store.state, up), UNTURNED, step);
+    const turned = { ...UNTURNED, wereReset: flipped || turnedSurfaces.size > 0 };
+    await shadeBy({ ...parsed.options, orient }, askedBy(store.state, up), turned, step);
+    flips = [];
   }
 
   /** `asked` is what the form asked for, `turned` what a person turned by hand since it was computed last. */
@@ -158,6 +164,25 @@ export function createSession(store: Store, viewer: Viewer): Session {
     const hasCurvature = result.curvature !== undefined;
     const used = { method, k, orient, asked };
     store.set({ scan: { ...scan, hasNormals: true, hasCurvature }, report, used, ...turned, ...compared(shown) });
+  }
+
+  /** Turns round the computed normals of one surface, or all. */
+  function turnRound(surface: number | undefined): void {
+    if (!shown?.result) return;
+    const { normals, components } = shown.result;
+    negate(normals, surface === undefined ? undefined : components, surface);
+    viewer.refreshNormals(normals);
+    const { flipped, backs, shading } = store.state;
+    const turnedSurfaces = new Set(store.state.turnedSurfaces);
+    if (surface !== undefined && !turnedSurfaces.delete(surface)) turnedSurfaces.add(surface);
+    store.set({
+      flipped: flipped !== (surface === undefined),
+      turnedSurfaces,
+      wereReset: false,
+      // Without back faces both sides look the same when shaded; normals as colours do not.
+      backs: backs || shading === 'shaded',
+      ...compared(shown),
+    });
   }
 
   return {
@@ -192,9 +217,11 @@ export function createSession(store: Store, viewer: Viewer): Session {
 
     async addCurvature() {
       const { result, options } = shown ?? {};
-      const { flipped, turnedSurfaces, used } = store.state;
+      const { flipped, turnedSurfaces, wereReset, used } = store.state;
       if (!result || !options || !used || result.curvature) return;
-      await run('Computing curvature', (step) => shadeBy(options, used.asked, { flipped, turnedSurfaces }, step));
+      await run('Computing curvature', (step) =>
+        shadeBy(options, used.asked, { flipped, turnedSurfaces, wereReset }, step),
+      );
     },
 
     showNormals(source) {
@@ -205,23 +232,19 @@ export function createSession(store: Store, viewer: Viewer): Session {
     },
 
     flip() {
-      if (!shown?.result) return;
-      negate(shown.result.normals);
-      viewer.refreshNormals(shown.result.normals);
-      // Without back faces both sides look the same when shaded; normals as colours do not.
-      const { flipped, backs, shading } = store.state;
-      store.set({ flipped: !flipped, backs: backs || shading === 'shaded', ...compared(shown) });
+      turnRound(undefined);
+      flips.push(undefined);
     },
 
     flipSurface(point) {
-      const { normals, components } = shown?.result ?? {};
-      const surface = components?.[point];
-      if (!shown || !normals || surface === undefined || surface === NO_SURFACE) return;
-      negate(normals, components, surface);
-      viewer.refreshNormals(normals);
-      const turnedSurfaces = new Set(store.state.turnedSurfaces);
-      if (!turnedSurfaces.delete(surface)) turnedSurfaces.add(surface);
-      store.set({ turnedSurfaces, ...compared(shown) });
+      const surface = shown?.result?.components?.[point];
+      if (surface === undefined || surface === NO_SURFACE) return;
+      turnRound(surface);
+      flips.push(surface);
+    },
+
+    undoFlip() {
+      if (flips.length > 0) turnRound(flips.pop());
     },
 
     save: () =>

@@ -35,9 +35,11 @@ export interface Turned {
   flipped: boolean;
   /** Those of single surfaces, besides. */
   turnedSurfaces: ReadonlySet<number>;
+  /** Whether there were such before the normals were computed anew. */
+  wereReset: boolean;
 }
 
-export const UNTURNED: Turned = { flipped: false, turnedSurfaces: new Set() };
+export const UNTURNED: Turned = { flipped: false, turnedSurfaces: new Set(), wereReset: false };
 
 export interface State extends OptionsForm, Turned {
   /** Whether files can be taken: false until the browser has been looked at. */
