@@ -260,7 +260,7 @@ test('another method, after a k that cannot be one', async () => {
   await drop(page, 'ball.ply', spherePly(20_000));
   await result(page, 'ball.ply');
   await page.getByRole('radio', { name: 'k nearest' }).check();
-  assert.ok(await page.getByText('Cell of the grid').isHidden());
+  assert.ok(await page.locator('#cell').isHidden());
   const field = page.getByRole('textbox', { name: 'nearest points' });
   const again = page.getByRole('button', { name: 'Re-run' });
   assert.equal(await field.inputValue(), '16');

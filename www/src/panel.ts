@@ -129,7 +129,8 @@ function showOptions(state: State, busy: boolean): void {
   element('#cell').hidden = method !== 'bilinear';
   const cell = element<HTMLInputElement>('#cell-value');
   cell.hidden = method !== 'bilinear' || cellKind === 'auto';
-  const label = cellKind === 'scale' ? 'Cell edge in multiples of L' : 'Cell edge in the unit of the file';
+  const label =
+    cellKind === 'scale' ? 'Edge of the cubes in multiples of L' : 'Edge of the cubes in the unit of the file';
   cell.setAttribute('aria-label', label);
   element('#k').hidden = method === 'bilinear';
   for (const [input, text] of [
@@ -258,7 +259,7 @@ function showResult(state: State): void {
   if (!scan) return;
   write('#total', report ? duration(report.milliseconds.total) : count(scan.points));
   const points = plural(scan.points, 'point');
-  const remedy = report && report.cellSize > 0 && report.noise === undefined ? ', try the cell Auto' : '';
+  const remedy = report && report.cellSize > 0 && report.noise === undefined ? ', try the size Auto' : '';
   const none = report?.unresolved === scan.points ? `: no normal was found${remedy}` : '';
   const label = report ? `for ${count(scan.points)} ${points}${none}` : `${points}, without normals`;
   write('#total-label', label);
