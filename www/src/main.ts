@@ -161,10 +161,9 @@ function takeTurns(session: Session, viewer: Viewer): void {
   const turn = (at?: { x: number; y: number }) => {
     const { turning, job } = store.state;
     const point = turning && !job ? viewer.pick(at) : -1;
-    if (point >= 0) session.flipSurface(point);
-    return point;
+    return point >= 0 && session.flipSurface(point);
   };
-  let turned = -1;
+  let turned = false;
   let pressed = { x: NaN, y: NaN, by: '' };
   let moved = 0;
   canvas.addEventListener('pointerdown', ({ clientX: x, clientY: y, pointerType: by }) => {
@@ -175,12 +174,12 @@ function takeTurns(session: Session, viewer: Viewer): void {
     moved = Math.max(moved, Math.hypot(x - pressed.x, y - pressed.y));
   });
   canvas.addEventListener('click', ({ clientX: x, clientY: y, detail }) => {
-    if (detail < 2) turned = moved <= still(pressed.by) ? turn({ x, y }) : -1;
+    if (detail < 2) turned = moved <= still(pressed.by) && turn({ x, y });
   });
   canvas.addEventListener('dblclick', () => {
     // Two clicks centre the view: what the first has turned is turned back.
-    if (turned >= 0) session.undoFlip();
-    turned = -1;
+    if (turned) session.undoFlip();
+    turned = false;
   });
   canvas.addEventListener('keydown', ({ key, repeat }) => {
     if (key === 'Enter' && !repeat) turn();

@@ -23,8 +23,8 @@ export interface Session {
   showNormals(source: NormalSource): void;
   /** Turns all normals round, those on the screen and so those that are saved. */
   flip(): void;
-  /** Turns those of the surface round that a point belongs to. */
-  flipSurface(point: number): void;
+  /** Turns those of the surface round that a point belongs to; answers whether it belongs to one. */
+  flipSurface(point: number): boolean;
   /** Takes back the last of these two that was not taken back. */
   undoFlip(): void;
   save(): Promise<void>;
@@ -238,9 +238,10 @@ export function createSession(store: Store, viewer: Viewer): Session {
 
     flipSurface(point) {
       const surface = shown?.result?.components?.[point];
-      if (surface === undefined || surface === NO_SURFACE) return;
+      if (surface === undefined || surface === NO_SURFACE) return false;
       turnRound(surface);
       flips.push(surface);
+      return true;
     },
 
     undoFlip() {
