@@ -4,7 +4,7 @@ use super::air::Sights;
 use super::components::{Decision, Side};
 use super::looks::{Look, Looks};
 use super::patches::{Patches, signed};
-use super::signs::Signs;
+use super::signs::{LEAST_PATCHES, Signs};
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::lists::filled;
@@ -12,9 +12,6 @@ use crate::progress::Stage;
 
 /// What errors call the memory of all this.
 const WHAT: &str = "the facing of surfaces";
-
-/// Surfaces of fewer patches are not worth the time.
-const LEAST_PATCHES: u64 = 32;
 
 /// A surface is told by looks, each as much as a ray that hits it head-on, if the square of their balance is so many times
 /// their sum: by more than sixteen at one side, by a hundred at one and fifty at the other. With twelve, roofs that look at each

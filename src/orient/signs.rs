@@ -25,6 +25,11 @@ pub(super) struct Signs {
 /// scan with trees, its patches turned to what they see, 0.54.
 pub(super) const CLOSED: f64 = 0.6;
 
+/// Open surfaces of fewer patches are not worth the time that they take beyond that of closed ones, and such a share of all
+/// patches.
+pub(super) const LEAST_PATCHES: u64 = 32;
+const SMALL: f64 = 0.01;
+
 impl Signs {
     /// Counts all that lies in the open.
     pub fn outward(groups: Groups, stage: &Stage) -> Result<Self, Error> {
@@ -32,8 +37,8 @@ impl Signs {
         Ok(Self { flipped, components: groups.components(), component: groups.component })
     }
 
-    /// Counts all that lies in the open for components that are closed then, and for others a share, beside the looks of their
-    /// patches at each other, which are answered if there are any such.
+    /// Counts all that lies in the open for components that are closed then, or small, and for others a share, beside the looks
+    /// of their patches at each other, which are answered if there are any such.
     pub fn consistent(
         groups: Groups,
         grid: &Grid,
@@ -58,15 +63,19 @@ impl Signs {
     }
 }
 
-/// For each component whether it is closed.
+/// For each component whether it is closed, or small.
 fn closed(groups: &Groups, sights: &Sights, flipped: &[bool]) -> Result<Vec<bool>, Error> {
-    let mut sums = filled((0.0, 0.0), groups.components(), WHAT)?;
+    let mut sums = filled((0.0, 0.0, 0), groups.components(), WHAT)?;
     for (i, &component) in groups.component.iter().enumerate() {
-        let (exposure, all) = &mut sums[component as usize];
+        let (exposure, all, patches) = &mut sums[component as usize];
         *exposure += f64::from(signed(flipped[i], sights.exposure[i]));
         *all += f64::from(sights.all[i]);
+        *patches += 1;
     }
+    let few = (SMALL * groups.component.len() as f64) as u64;
     let mut is_closed = filled(false, sums.len(), WHAT)?;
-    is_closed.iter_mut().zip(sums).for_each(|(is_closed, (exposure, all))| *is_closed = exposure.abs() > CLOSED * all);
+    for (is_closed, (exposure, all, patches)) in is_closed.iter_mut().zip(sums) {
+        *is_closed = exposure.abs() > CLOSED * all || patches < LEAST_PATCHES && patches < few;
+    }
     Ok(is_closed)
 }
