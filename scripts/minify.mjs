@@ -1,5 +1,5 @@
 // node scripts/minify.mjs FILE ...: makes modules as short as may be, in place. On its own because the minifier is not
-// there before setup.mjs has run. It is that of Rolldown, which makes 230 bytes less than esbuild's of the package's 8 KiB.
+// there before setup.mjs has run. It is that of Rolldown, because esbuild's leaves the package larger, by a thirtieth.
 
 import { readFileSync, writeFileSync } from 'node:fs';
 import { minifySync } from 'rolldown/utils';
