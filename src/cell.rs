@@ -134,7 +134,7 @@ struct Probes {
     edge: f64,
     /// 1 / edge.
     scale: f64,
-    /// Sorted by cube.
+    /// In the order of their first points.
     chosen: Vec<(Cube, u32)>,
     /// By hash of their cubes, open-addressed: the number of each in `chosen`, plus one; 0 where there is none. Mostly empty, as
     /// most points are in no probe.
@@ -156,16 +156,10 @@ impl Probes {
         for halvings in 0..64 {
             probes.edge = extent * exp2(-f64::from(halvings));
             probes.scale = 1.0 / probes.edge;
-            let mut cubes: Vec<Cube> = sample.iter().step_by(step).map(|p| probes.cube(*p).0).collect();
-            cubes.sort_unstable();
-            probes.chosen = cubes.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as u32)).collect();
+            probes.chosen.clear();
             probes.table = vec![0; SLOTS];
-            for (number, (cube, _)) in (1..).zip(&probes.chosen) {
-                let mut slot = hash(*cube);
-                while probes.table[slot] != 0 {
-                    slot = (slot + 1) % SLOTS;
-                }
-                probes.table[slot] = number;
+            for &point in sample.iter().step_by(step) {
+                probes.choose(probes.cube(point).0);
             }
             let is_inside = |point: &DVec3| probes.find(probes.cube(*point).0).is_some();
             let others = sample.iter().enumerate().filter(|(i, point)| i % step != 0 && is_inside(point)).count();
@@ -182,6 +176,19 @@ impl Probes {
         let floor = place.floor();
         // Adding zero turns -0 into 0.
         (floor.to_array().map(|number| (number + 0.0).to_bits() as i64), place - floor)
+    }
+
+    /// Counts a chosen point in a cube.
+    fn choose(&mut self, cube: Cube) {
+        let mut slot = hash(cube);
+        while self.table[slot] != 0 && self.chosen[self.table[slot] as usize - 1].0 != cube {
+            slot = (slot + 1) % SLOTS;
+        }
+        if self.table[slot] == 0 {
+            self.chosen.push((cube, 0));
+            self.table[slot] = self.chosen.len() as u16;
+        }
+        self.chosen[self.table[slot] as usize - 1].1 += 1;
     }
 
     /// The number of the probe at a cube.
