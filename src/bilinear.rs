@@ -2,6 +2,7 @@
 
 use crate::bricks::set_bits;
 use crate::error::Error;
+use crate::frame::Frame;
 use crate::grid::{Grid, Placed, octants};
 use crate::lanes::transposed;
 use crate::lattice::cube_centre;
@@ -23,7 +24,7 @@ pub(crate) fn interpolate(
     count: usize,
     stage: &Stage,
 ) -> Result<(Found, [u64; 5]), Error> {
-    let normals = Normals::new(count, grid.placed.len(), variations.is_some())?;
+    let normals = Normals::new(count, grid.placed.len(), variations.is_some(), &Frame::GIVEN)?;
     let all_used = [const { AtomicU64::new(0) }; 5];
     stage.run(grid.blocks.len(), &|block| {
         let mut surroundings = Surroundings::new();

@@ -5,6 +5,7 @@ use crate::baseline::{self, Baseline, Tree};
 use crate::bilinear;
 use crate::cell::{self, Density};
 use crate::error::Error;
+use crate::frame::Frame;
 use crate::grid::Grid;
 use crate::lattice::{CUBES, Lattice};
 use crate::nodes::{self, Node};
@@ -44,7 +45,7 @@ pub struct Report {
     pub cells: u64,
     /// Cubes that hold their node.
     pub nodes: u64,
-    /// Cubes along each axis of the bounding box, at most 2^30; with [`Cell::Auto`] at most 2^22.
+    /// Cubes along each axis of the bounding box, at most 2^30; with [`Cell::Auto`] along axes of the cloud's own, at most 2^22.
     pub grid: [u64; 3],
     /// Edge of a cube, in units of the input.
     pub cell_size: f64,
@@ -80,14 +81,17 @@ pub struct Scale {
 ///
 /// [`Method::Bilinear`] is linear in the number of points. Beyond the input it takes about 30 bytes a point with cubes that
 /// hold 4 points or more, up to some 130 when every point has a cube for itself; with [`Cell::Auto`] about 40, up to 70
-/// where no surface is smooth. The baselines take n log n time and 30 bytes a point. Signs by [`Orient::Consistent`] and
-/// [`Orient::Outward`] take 27 bytes a point after all that is given back, up to 190 where there is no surface.
+/// where no surface is smooth, and 12 for a copy of positions that are borrowed, or that signs need. The baselines take
+/// n log n time and 30 bytes a point. Signs by [`Orient::Consistent`] and [`Orient::Outward`] take 27 bytes a point after all
+/// that is given back, up to 190 where there is no surface.
 ///
 /// # Errors
 /// [`Error::Input`] and [`Error::Unsupported`] for the options, [`Error::Limit`] when memory does not suffice,
 /// [`Error::Cancelled`] when `progress` asked for it.
 pub fn estimate(points: &Points, options: &Options, progress: &Progress) -> Result<Estimate, Error> {
-    run(points.borrowed(), options, progress)
+    let points = points.borrowed();
+    // With only the default options there is nothing that could do without a copy.
+    run(if cfg!(feature = "full") { points } else { points.owned()? }, options, progress)
 }
 
 /// As [`estimate`], with the same result, of points that own their memory ([`Points::from_vec`], [`Points::from_f64`]): it is
@@ -119,13 +123,8 @@ fn run(points: Points, options: &Options, progress: &Progress) -> Result<Estimat
     let cloud = Cloud { count: points.len(), unit: points.unit, bounds: Bounds::of(&points) };
     laps.end("bounds");
 
-    let density = |points: &Points| {
-        first.update("cellSize", 0.03)?;
-        Density::of(points, &cloud.bounds)
-    };
     if !cfg!(feature = "full") {
-        let density = density(&points)?;
-        return adaptive(points, &cloud, options, &density, laps);
+        return adaptive(points, &cloud, options, laps);
     }
     // Those that signs need are borrowed, others given away.
     let kept;
@@ -135,12 +134,8 @@ fn run(points: Points, options: &Options, progress: &Progress) -> Result<Estimat
     } else {
         (points, None)
     };
-    let mut known = None;
     let mut estimate = match (options.method, options.cell) {
-        (Method::Bilinear, Cell::Auto) => {
-            let density = known.insert(density(&points)?);
-            adaptive(points, &cloud, options, density, laps)
-        }
+        (Method::Bilinear, Cell::Auto) => adaptive(points.owned()?, &cloud, options, laps),
         (Method::Bilinear, Cell::Scale(scale)) => bilinear(points, &cloud, options, scale * cloud.paper_edge(), laps),
         (Method::Bilinear, Cell::Size(size)) => {
             bilinear(points, &cloud, options, cell::edge_of_size(size, cloud.unit)?, laps)
@@ -156,7 +151,7 @@ fn run(points: Points, options: &Options, progress: &Progress) -> Result<Estimat
         let mut laps = Laps::start(progress);
         let normals = bytemuck::cast_slice_mut(&mut estimate.normals);
         let stage = progress.stage("orientation", share..1.0);
-        let surfaces = orient(needed, normals, &cloud.bounds, known, options, &stage)?;
+        let surfaces = orient(needed, normals, &cloud.bounds, options, &stage)?;
         if let Some(surfaces) = surfaces {
             estimate.components = surfaces.of_point;
             estimate.report.components = Some(surfaces.components);
@@ -196,19 +191,17 @@ fn describe(cloud: &Cloud, lattice: &Lattice, found: &Found, laps: Laps) -> Repo
     }
 }
 
-/// Cubes of the sizes that the cloud asks for.
-fn adaptive(
-    points: Points,
-    cloud: &Cloud,
-    options: &Options,
-    density: &Density,
-    mut laps: Laps,
-) -> Result<Estimate, Error> {
+/// Cubes of the sizes that the cloud asks for, along axes of its own.
+fn adaptive(mut points: Points, cloud: &Cloud, options: &Options, mut laps: Laps) -> Result<Estimate, Error> {
     let progress = laps.progress;
-    let lattice = Lattice::new(&cloud.bounds, &|| density.middle, density.edge(cell::POINTS_PER_CELL), adaptive::CUBES);
+    progress.update("cellSize", 0.03)?;
+    let frame = Frame::of(&points);
+    let bounds = frame.turn(points.positions_mut());
+    let density = Density::of(&points, &bounds)?;
+    let lattice = Lattice::new(&bounds, &|| density.middle, density.edge(cell::POINTS_PER_CELL), adaptive::CUBES);
     laps.end("cellSize");
     let lap = &mut |phase| laps.end(phase);
-    let answer = adaptive::normals(points, &lattice, options.curvature, progress, lap)?;
+    let answer = adaptive::normals(points, &lattice, &frame, options.curvature, progress, lap)?;
     let mut report = describe(cloud, &lattice, &answer.found, laps);
     report.cells = answer.cubes;
     report.nodes = answer.surfaces;

@@ -1,6 +1,7 @@
 //! One normal for each point, and if wanted its curvature, as every method hands them over.
 
 use crate::error::Error;
+use crate::frame::Frame;
 use crate::lanes::{inverse_root, load, transposed};
 use crate::parallel::{self, Filling};
 use crate::points::CHUNK;
@@ -14,6 +15,8 @@ pub(crate) struct Normals {
     /// The surface variation of the same points, if it was asked for.
     curvature: Option<Filling<f32>>,
     resolved: AtomicU64,
+    /// For each axis of the input what those of the directions have along it.
+    axes: [Vec3; 3],
 }
 
 /// What was found for all points.
@@ -27,8 +30,9 @@ pub(crate) struct Found {
 }
 
 impl Normals {
-    /// For `count` points, of which `expected` will be written; if these are not all, the others are zero.
-    pub fn new(count: usize, expected: usize, curvature: bool) -> Result<Self, Error> {
+    /// For `count` points, of which `expected` will be written; if these are not all, the others are zero. Directions are in
+    /// `frame`.
+    pub fn new(count: usize, expected: usize, curvature: bool, frame: &Frame) -> Result<Self, Error> {
         let normals = Filling::new(count, "the normals")?;
         // Else nobody can ask for it.
         let curvature = cfg!(feature = "full") && curvature;
@@ -43,7 +47,7 @@ impl Normals {
                 }
             });
         }
-        Ok(Self { normals, curvature, resolved: AtomicU64::new(0) })
+        Ok(Self { normals, curvature, resolved: AtomicU64::new(0), axes: frame.axes })
     }
 
     /// What one task hands its normals over with; all are written when it is dropped.
@@ -138,8 +142,10 @@ impl Writer<'_> {
     #[inline(never)]
     fn flush(&mut self) {
         let length = std::mem::take(&mut self.length);
+        let [a, b, c] = self.normals.axes;
         for (four, rows) in self.rows.chunks_exact_mut(4).enumerate().take(length.div_ceil(4)) {
             let [x, y, z, points] = self.gathered.each_ref().map(|row| load(&row[4 * four..]));
+            let [x, y, z] = [0, 1, 2].map(|i| a[i] * x + b[i] * y + c[i] * z);
             let square = x * x + y * y + z * z;
             // Zero stays zero.
             let scale = inverse_root(square.max(Vec4::splat(f32::MIN_POSITIVE)));

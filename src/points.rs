@@ -1,12 +1,13 @@
 //! Positions relative to a double-precision origin.
 
 use crate::error::Error;
-use crate::lists::reserve;
+use crate::lanes::load;
+use crate::lists::{fitted, reserve};
 use crate::order::{from_ordinal, ordinal, sort};
 use crate::parallel;
 use crate::power::{exp2, log2};
 use bytemuck::cast_slice;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 use std::borrow::Cow;
 use std::sync::{Mutex, PoisonError};
 
@@ -72,6 +73,20 @@ impl<'a> Points<'a> {
         Points { positions: Cow::Borrowed(&self.positions), ..*self }
     }
 
+    /// The same points in memory of their own: those that are borrowed are copied.
+    pub(crate) fn owned(self) -> Result<Points<'static>, Error> {
+        let positions = match self.positions {
+            Cow::Owned(positions) => positions,
+            Cow::Borrowed(positions) => fitted(positions, "the cloud")?,
+        };
+        Ok(Points { positions: Cow::Owned(positions), ..self })
+    }
+
+    /// The positions, to be changed. They should be owned: for a copy that does not fit this has no error.
+    pub(crate) fn positions_mut(&mut self) -> &mut [Vec3] {
+        self.positions.to_mut()
+    }
+
     /// The number of points.
     pub fn len(&self) -> usize {
         self.positions.len()
@@ -126,10 +141,15 @@ impl Bounds {
 
     /// One pass over the points.
     pub fn of(points: &Points) -> Self {
+        Self::of_chunks(points.len(), &|i| points.chunk(i))
+    }
+
+    /// Of `count` points, in chunks of [`CHUNK`].
+    pub fn of_chunks<'a>(count: usize, chunk: &(dyn Fn(usize) -> &'a [Vec3] + Sync)) -> Self {
         // Neither minima nor counts depend on the order in which the chunks come.
         let bounds = Mutex::new(Self::EMPTY);
-        parallel::each(points.chunks(), &|i| {
-            let chunk = Self::of_chunk(points.chunk(i));
+        parallel::each(count.div_ceil(CHUNK), &|i| {
+            let chunk = Self::of_chunk(chunk(i));
             let mut bounds = bounds.lock().unwrap_or_else(PoisonError::into_inner);
             *bounds = bounds.join(chunk);
         });
@@ -145,30 +165,21 @@ impl Bounds {
         Self { min: self.min.min(other.min), max: self.max.max(other.max), finite: self.finite + other.finite }
     }
 
+    #[inline(never)]
     fn of_chunk(chunk: &[Vec3]) -> Self {
-        // Four points are three vectors of four lanes, which the compiler compares at once.
-        const LANES: usize = 12;
-        let (blocks, rest) = bytemuck::cast_slice::<Vec3, f32>(chunk).as_chunks::<LANES>();
-        let (mut min, mut max, mut spoilt) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES], [0.0; LANES]);
-        for block in blocks {
-            for lane in 0..LANES {
-                let value = block[lane];
-                min[lane] = if value < min[lane] { value } else { min[lane] };
-                max[lane] = if value > max[lane] { value } else { max[lane] };
-                // Not a number as soon as one value is infinite or not a number.
-                spoilt[lane] += value * 0.0;
-            }
+        let (mut min, mut max, mut spoilt) = (Vec4::INFINITY, Vec4::NEG_INFINITY, Vec4::ZERO);
+        // With the first number of the next point, which is looked at and not used: four lanes are compared at once.
+        for point in bytemuck::cast_slice(chunk).windows(4).step_by(3).map(load) {
+            min = min.min(point);
+            max = max.max(point);
+            // Not a number as soon as one is infinite or not a number.
+            spoilt += point * 0.0;
         }
-        if spoilt.iter().any(|s| s.is_nan()) {
+        if spoilt.is_nan() {
             return Self::of_points(chunk);
         }
-        let lanes = |lanes: [f32; LANES]| bytemuck::cast::<_, [Vec3; 4]>(lanes);
-        let bounds = Self {
-            min: lanes(min).into_iter().fold(Vec3::INFINITY, Vec3::min),
-            max: lanes(max).into_iter().fold(Vec3::NEG_INFINITY, Vec3::max),
-            finite: 4 * blocks.len(),
-        };
-        bounds.join(Self::of_points(bytemuck::cast_slice(rest)))
+        let last = chunk.len().saturating_sub(1);
+        Self { min: min.xyz(), max: max.xyz(), finite: last }.join(Self::of_points(&chunk[last..]))
     }
 
     fn of_points(points: &[Vec3]) -> Self {

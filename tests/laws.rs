@@ -308,17 +308,28 @@ fn permutation_moves_the_normals_with_the_points() {
     assert!((0.8..1.25).contains(&(a / b)), "{a} against {b} degrees");
 }
 
-/// Turning a cloud changes the grid it meets: a slanted surface crosses its 27 cubes in a wider patch, so it is smoothed
-/// more, within bounds.
+/// 'auto' sorts a cloud along axes of its own, which are turned with it.
 #[test]
-fn rotation_keeps_the_accuracy_within_bounds() {
-    let cloud = terrain(100_000, 14);
-    let turned = Cloud::of(
-        cloud.points.chunks(3).zip(&cloud.normals).map(|(p, n)| (turn([0, 1, 2].map(|i| f64::from(p[i]))), turn(*n))),
-    );
+fn rotation_keeps_the_accuracy() {
     let error = |cloud: &Cloud| root_mean_square(&angles(&run(&cloud.points, Cell::Auto).normals, &cloud.normals));
-    let (straight, turned) = (error(&cloud), error(&turned));
-    assert!((0.67..1.5).contains(&(turned / straight)), "{turned} against {straight} degrees");
+    for (name, cloud, most) in [
+        ("terrain", terrain(100_000, 14), 0.16),
+        ("terrain with noise", terrain(100_000, 14).noisy(0.006, 15), 6.7),
+        ("cube", cube(100_000, 16), 0.85),
+        ("cube with noise", cube(100_000, 16).noisy(0.0012, 17), 8.5),
+    ] {
+        let turned = Cloud::of(
+            cloud
+                .points
+                .chunks(3)
+                .zip(&cloud.normals)
+                .map(|(p, n)| (turn([0, 1, 2].map(|i| f64::from(p[i]))), turn(*n))),
+        );
+        let (straight, turned) = (error(&cloud), error(&turned));
+        println!("{name}: {straight}, turned {turned} degrees");
+        assert!(straight < most, "{name}: {straight} degrees");
+        assert!((0.95..1.05).contains(&(turned / straight)), "{name}: {turned} against {straight} degrees");
+    }
 }
 
 /// Turning a cloud turns the normals of the baselines, but where a decision of the elliptic Gabriel graph, or that for the
@@ -356,8 +367,8 @@ fn a_stray_point_changes_nothing_noticeable() {
         assert!((with.report.cell_size / without.report.cell_size - 1.0).abs() < 0.1);
         let error = |normals: &[f32]| root_mean_square(&angles(normals, &cloud.normals));
         let (a, b) = (error(&with.normals[..150_000]), error(&without.normals));
-        // What is left of the error on a smooth surface grows with more than the square of the cubes.
-        assert!((a / b - 1.0).abs() < 0.15, "{stray:?}: {a} against {b} degrees");
+        // What is left of the error on a smooth surface grows with more than the square of the cubes, which lie along other axes.
+        assert!((a / b - 1.0).abs() < 0.3, "{stray:?}: {a} against {b} degrees");
         assert_eq!(with.report.unresolved, lost);
     }
 }

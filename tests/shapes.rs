@@ -121,14 +121,15 @@ fn a_regular_grid_on_a_plane() {
         }
     }
     for normal in run(&points, Cell::Auto).normals.chunks(3) {
-        assert!(normal[0].abs().max(normal[1].abs()) < 1e-12 && normal[2] == 1.0, "{normal:?}");
+        assert!(normal[0].abs().max(normal[1].abs()) < 1e-6 && (normal[2] - 1.0).abs() < 1e-6, "{normal:?}");
     }
 }
 
 /// About 32 points in an occupied cube, whatever the shape of the cloud.
 #[test]
 fn auto_begins_with_evenly_filled_cubes() {
-    let flat = plane(50_000, 7, [0.0, 0.0, 1.0]);
+    // Askew: cubes along a plane hold whole slices of it.
+    let flat = plane(50_000, 7, turn([0.0, 0.0, 1.0]));
     let mut strays = sphere(50_000, 8).points;
     strays.extend((0..200).map(|i| if i % 2 == 0 { 1e6 } else { -3e5 * i as f32 }).take(198));
     let mut random = Random(9);

@@ -42,7 +42,7 @@ pub(super) enum Role {
 
 /// The sums of a cube's own samples count whole in its surface, those of a cube beyond its side this much, beyond an edge
 /// the square of it, beyond a corner the cube.
-const NEXT: f32 = 0.7;
+const NEXT: f32 = 0.6;
 
 impl Level {
     /// Sorts the points, and counts the samples of each cube: the points of an octant are one.

@@ -15,6 +15,7 @@ mod tally;
 mod vote;
 
 use crate::error::Error;
+use crate::frame::Frame;
 use crate::lattice::{self, Lattice};
 use crate::lists::grow;
 use crate::normals::{Found, Normals};
@@ -56,13 +57,15 @@ const _: () = assert!(CUBES == (2 << DOUBLINGS) as f64);
 /// Sizes of cubes in all.
 const SIZES: usize = DIVISIONS + DOUBLINGS + 1;
 
-/// Finds the normals of all points on cubes of `lattice`; gives the points up when they are sorted. Calls `lap` at the end of
-/// each phase. In time linear in the points; what is divided to the end takes some ten times as long as what is smooth.
+/// Finds the normals of all points, which are in `frame`, on cubes of `lattice`; gives the points up when they are sorted.
+/// Calls `lap` at the end of each phase. In time linear in the points; what is divided to the end takes some ten times as long
+/// as what is smooth.
 #[optimize(size)]
 #[inline(never)]
 pub(crate) fn normals(
     points: Points,
     lattice: &Lattice,
+    frame: &Frame,
     curvature: bool,
     progress: &Progress,
     lap: &mut dyn FnMut(&'static str),
@@ -71,7 +74,7 @@ pub(crate) fn normals(
     let count = points.len();
     drop(points);
     // At once: they fit into the memory that the positions had, unless something smaller takes a part of it first.
-    let normals = Normals::new(count, base.grid.placed.len(), curvature)?;
+    let normals = Normals::new(count, base.grid.placed.len(), curvature, frame)?;
     base.sample(None, &progress.stage("sort", 0.28..0.3))?;
     lap("sort");
     let mut levels = vec![base];

@@ -6,6 +6,7 @@ mod select;
 mod tree;
 
 use crate::error::Error;
+use crate::frame::Frame;
 use crate::lists::reserve;
 use crate::normals::{Found, Normals};
 use crate::parallel;
@@ -51,7 +52,7 @@ pub(crate) fn normals(
     // What the tasks are going to take is refused here, because they cannot.
     reserve(&mut Vec::<u8>::new(), parallel::threads() * Search::bytes(k), "the neighbours")?;
 
-    let normals = Normals::new(count, tree.places.len(), curvature)?;
+    let normals = Normals::new(count, tree.places.len(), curvature, &Frame::GIVEN)?;
     let size = (NEIGHBOURS / k.max(1)).clamp(16, 1024);
     stage.run(tree.places.len().div_ceil(size), &|task| {
         let (mut search, mut writer) = (Search::new(tree, k), normals.writer());

@@ -91,7 +91,7 @@ export interface Report {
   cells: number;
   /** Cubes with a valid node; with `cell: 'auto'`, with a surface. */
   nodes: number;
-  /** Cubes along each axis, at most 2^30; with `cell: 'auto'` at most 2^22. */
+  /** Cubes along each axis, at most 2^30; with `cell: 'auto'` along axes of the cloud's own, at most 2^22. */
   grid: [number, number, number];
   /** Edge of the cubes in the units of the input; with `cell: 'auto'`, of those that it begins with. */
   cellSize: number;
