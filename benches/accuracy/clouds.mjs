@@ -35,6 +35,21 @@ export function cloudOf(sampler, count, { noise, keep }, seed) {
   return { positions, normals };
 }
 
+/** The same points or directions, turned about no special axis. */
+export function turned(vectors) {
+  // By the quaternion 1 + 0.3 i - 0.45 j + 0.7 k.
+  const [w, x, y, z] = [1, 0.3, -0.45, 0.7].map((part) => part / Math.hypot(1, 0.3, -0.45, 0.7));
+  const rows = [
+    [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+    [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+    [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+  ];
+  return vectors.map((_, i) => {
+    const from = i - (i % 3);
+    return rows[i % 3].reduce((sum, factor, axis) => sum + factor * vectors[from + axis], 0);
+  });
+}
+
 /** Whether a candidate stays, by its place along the longest side. */
 function pattern(sampler, keep, seed) {
   const pilot = cloudOf(sampler, PILOT, {}, seed);

@@ -1,7 +1,7 @@
 // The measurements: rows of clouds by methods, as plain numbers.
 
 import { Failure } from '../../scripts/run.mjs';
-import { cloudOf, VARIANTS } from './clouds.mjs';
+import { cloudOf, turned, VARIANTS } from './clouds.mjs';
 import { jetNormal } from './jet.mjs';
 import { angles, summary, unresolved } from './judge.mjs';
 import { nearestNeighbours } from './neighbours.mjs';
@@ -108,7 +108,7 @@ async function warmUp(estimator) {
 /**
  * `{ method: { rms, mean, over, unresolved, milliseconds, sampled } }`, where `sampled` is the root mean square over the
  * points at which the jet was fitted; a jet has nothing but that. `auto` also has `missed`: the share of the points
- * without a normal that have one by the nearest neighbours.
+ * without a normal that have one by the nearest neighbours; and `turned`: the root mean square of the cloud when it is turned.
  */
 async function measure(estimator, { positions, normals: truth }, sampled) {
   const chosen = sample(positions.length / 3, sampled);
@@ -126,6 +126,8 @@ async function measure(estimator, { positions, normals: truth }, sampled) {
     found[name] = normals;
   }
   methods.auto.missed = unresolved(found.auto, truth, found[RESOLVES]);
+  const { normals } = await estimator.estimateNormals(turned(positions), METHODS.auto);
+  methods.auto.turned = summary(angles(normals, turned(truth))).rms;
   return { ...methods, ...jets(positions, truth, chosen) };
 }
 
@@ -170,9 +172,12 @@ function compare(methods) {
     ratio: ratio(methods.auto.rms, methods[best].rms),
     bestOfAll,
     ratioOfAll: ratio(methods.auto.sampled, methods[bestOfAll].sampled),
+    turning: change(methods.auto.turned, methods.auto.rms),
   };
 }
 
 export const ratio = (error, reference) => Math.max(error, LEAST) / Math.max(reference, LEAST);
+/** By how many times the larger of two errors is the smaller one. */
+const change = (a, b) => Math.max(ratio(a, b), ratio(b, a));
 export const geometricMean = (values) =>
   Math.exp(values.reduce((sum, value) => sum + Math.log(value), 0) / values.length);

@@ -52,6 +52,7 @@ export function report(rows, { machine, threads, minutes, sampled, hasFolder, sk
 function overview(rows, measured) {
   const line = (label, rows) => {
     const worst = most(rows, ({ ratio }) => ratio);
+    const turned = most(rows, ({ turning }) => turning);
     const missed = most(rows, ({ methods }) => methods.auto.missed);
     return [
       label,
@@ -61,6 +62,7 @@ function overview(rows, measured) {
       rows.filter(({ ratio }) => ratio <= 1).length,
       times(geometricMean(rows.map(({ ratioOfAll }) => ratioOfAll))),
       missed.methods.auto.missed > 0 ? `${percent(missed.methods.auto.missed)} (${missed.name})` : '0',
+      `${turned.turning.toFixed(3)} (${turned.name}, ${LABELS[turned.variant]})`,
     ];
   };
   const groups = [
@@ -69,7 +71,16 @@ function overview(rows, measured) {
   ].filter(([, group]) => group.length > 0);
   return paragraphs(
     table(
-      ['rows', 'number', 'auto / best k', 'worst', 'not above 1', 'auto / best of knn and jet', 'missed at most'],
+      [
+        'rows',
+        'number',
+        'auto / best k',
+        'worst',
+        'not above 1',
+        'auto / best of knn and jet',
+        'missed at most',
+        'turned',
+      ],
       [
         ...measured.map((variant) =>
           line(
@@ -81,7 +92,7 @@ function overview(rows, measured) {
         line('all', rows),
       ],
     ),
-    'Ratios are geometric means over the rows. The last but one is against the best of all knn and jets of the same k, all at the sampled points. Missed: the largest share of the points of a row that have no normal by auto, but have one by knn with k = 16.',
+    'Ratios are geometric means over the rows. The last but one is against the best of all knn and jets of the same k, all at the sampled points. Missed: the largest share of the points of a row that have no normal by auto, but have one by knn with k = 16. Turned: by how many times the error of a row changes at the most, to either side, when the cloud is turned about no special axis.',
   );
 }
 
