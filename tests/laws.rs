@@ -373,6 +373,27 @@ fn a_stray_point_changes_nothing_noticeable() {
     }
 }
 
+/// Scanners write `0 0 0` for what gave no echo, here three times of four.
+#[test]
+fn marks_for_missing_echoes_change_nothing_noticeable() {
+    let cloud = sphere(50_000, 15);
+    let place = [40.0, -25.0, 3.0];
+    let cloud = Cloud::of(
+        cloud.points.chunks(3).zip(&cloud.normals).map(|(p, n)| ([0, 1, 2].map(|i| place[i] + f64::from(p[i])), *n)),
+    );
+    let marked = [cloud.points.clone(), vec![0.0; 450_000]].concat();
+    let marked_f64: Vec<f64> = marked.iter().map(|&number| f64::from(number)).collect();
+    let without = run(&cloud.points, Cell::Auto);
+    let error = |normals: &[f32]| root_mean_square(&angles(&normals[..150_000], &cloud.normals));
+    let points = [Points::from_f32(&marked).unwrap(), Points::from_f64(&marked_f64).unwrap()];
+    for points in points {
+        let with = estimate(&points, &Options::default(), &Progress::silent()).unwrap();
+        assert!((with.report.cell_size / without.report.cell_size - 1.0).abs() < 0.1);
+        let (a, b) = (error(&with.normals), error(&without.normals));
+        assert!((a / b - 1.0).abs() < 0.3, "{a} against {b} degrees");
+    }
+}
+
 /// Also if the list has room for more, which is given back first.
 #[test]
 fn points_given_away_get_the_same_normals() {
