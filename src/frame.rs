@@ -10,7 +10,7 @@ const ROUNDS: usize = 16;
 /// An origin and orthogonal axes.
 pub(crate) struct Frame {
     /// In the positions' coordinates.
-    pub origin: DVec3,
+    origin: DVec3,
     /// The unit vectors along the axes.
     pub axes: [Vec3; 3],
 }

@@ -92,7 +92,7 @@ function overview(rows, measured) {
         line('all', rows),
       ],
     ),
-    'Ratios are geometric means over the rows. The last but one is against the best of all knn and jets of the same k, all at the sampled points. Missed: the largest share of the points of a row that have no normal by auto, but have one by knn with k = 16. Turned: by how many times the error of a row changes at the most, to either side, when the cloud is turned about no special axis.',
+    'Ratios are geometric means over the rows. That of knn and jet is against the best of all of the same k, all at the sampled points. Missed: the largest share of the points of a row that have no normal by auto, but have one by knn with k = 16. Turned: by how many times the error of a row changes at the most, to either side, when the cloud is turned about no special axis.',
   );
 }
 
