@@ -26,6 +26,10 @@ pub(crate) fn sort(numbers: &mut Vec<i64>) {
         let mut next = [0; 256];
         let mut total = 0;
         numbers.iter().for_each(|&number| next[digit(number)] += 1);
+        // All alike, as the last bits of what was in single precision.
+        if numbers.first().is_none_or(|&first| next[digit(first)] == numbers.len()) {
+            continue;
+        }
         next.iter_mut().for_each(|next| total += std::mem::replace(next, total));
         for &number in &*numbers {
             let next = &mut next[digit(number)];
