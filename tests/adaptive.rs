@@ -27,8 +27,8 @@ fn smooth_and_sharp_clean_and_noisy() {
         ("sphere, noise 0.12 %", sphere(200_000, 2).noisy(0.0012, 6), 0.5),
         ("sphere, noise 0.6 %", sphere(200_000, 2).noisy(0.006, 7), 2.0),
         ("torus, noise 0.6 %", torus(200_000, 3).noisy(0.006, 7), 4.6),
-        ("cube, noise 0.12 %", cube(200_000, 5).noisy(0.0012, 8), 8.0),
-        ("cube, noise 0.6 %", cube(200_000, 5).noisy(0.006, 9), 15.6),
+        ("cube, noise 0.12 %", cube(200_000, 5).noisy(0.0012, 8), 7.3),
+        ("cube, noise 0.6 %", cube(200_000, 5).noisy(0.006, 9), 15.1),
     ] {
         let (angles, result) = errors(&cloud);
         let error = root_mean_square(&angles);

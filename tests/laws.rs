@@ -268,14 +268,19 @@ fn the_same_bits_for_any_number_of_threads() {
 /// Powers of two and whole numbers that single precision holds exactly: the same bits.
 #[test]
 fn scale_and_shift_change_nothing() {
-    let points: Vec<f32> = terrain(30_000, 11).points.iter().map(|c| (c * 4096.0).round() / 4096.0).collect();
-    let scaled: Vec<f32> = points.iter().map(|c| c * 1024.0).collect();
-    let shifted: Vec<f32> = points.iter().map(|c| c + 16.0).collect();
-    for options in [cells(&[Cell::Auto, Cell::Scale(1.0)]), baselines(&[None])].concat() {
-        let options = Options { curvature: true, ..options };
-        let result = estimate_f32(&points, &options);
-        for moved in [&scaled, &shifted].map(|moved| estimate_f32(moved, &options)) {
-            assert!(moved.normals == result.normals && moved.curvature == result.curvature, "{options:?}");
+    for points in [terrain(30_000, 11).points, cube(20_000, 28).points] {
+        let points: Vec<f32> = points.iter().map(|c| (c * 4096.0).round() / 4096.0).collect();
+        let scaled = |power| points.iter().map(|c| c * 2f32.powi(power)).collect::<Vec<_>>();
+        let shifted: Vec<f32> = points.iter().map(|c| c + 16.0).collect();
+        for options in [cells(&[Cell::Auto, Cell::Scale(1.0)]), baselines(&[None])].concat() {
+            let options = Options { curvature: true, ..options };
+            let result = estimate_f32(&points, &options);
+            // Far beyond what any unit of length makes of a scan.
+            let powers: &[i32] = if options.cell == Cell::Auto { &[10, -60, 60] } else { &[10] };
+            for moved in powers.iter().map(|&power| scaled(power)).chain([shifted.clone()]) {
+                let moved = estimate_f32(&moved, &options);
+                assert!(moved.normals == result.normals && moved.curvature == result.curvature, "{options:?}");
+            }
         }
     }
 }

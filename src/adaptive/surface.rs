@@ -56,6 +56,9 @@ pub(super) struct Surface {
     pub is_curved: bool,
     /// Whether the samples lie off it by more than their points' own spread accounts for, and than noise.
     pub lacks_detail: bool,
+    /// Whether it is a plane in noise so wide that the parts of its cube, with a quarter of the points on half the width, would
+    /// know less.
+    pub is_plane_in_noise: bool,
 }
 
 impl Surface {
@@ -70,6 +73,7 @@ impl Surface {
         points: 0.0,
         is_curved: false,
         lacks_detail: false,
+        is_plane_in_noise: false,
     };
 
     /// Variance of the angle of its normal at a place.
@@ -89,6 +93,18 @@ pub(super) const SAMPLE: f64 = 48.0;
 
 /// So much of the noise must be left inside of samples: less does not tell how much there was.
 const CUT: f64 = 0.3;
+
+/// The share of what noise leaves inside of samples that tells it.
+pub(super) const WITHIN: f64 = 0.85;
+
+/// Parts of a cube know less than it where noise has so much variance, in square edges: a deviation of 0.11.
+const DEEP: f64 = 0.012;
+
+/// A surface that bends less in an edge, in radians and squared, may be a plane.
+const PLANE: f64 = 0.005;
+
+/// And it is one where it is so many times as wide as thick, squared.
+const CLEAR: f64 = 3.5;
 
 /// There may be so much more noise than what is left inside of samples tells.
 const MORE: f64 = 1.15;
@@ -180,9 +196,14 @@ impl Window {
                 surface.within = own as f32;
                 // Of noise the faces between the samples cut off a part.
                 let whole = own / (1.0 - SAMPLE * own).max(CUT);
-                let is_noise = scatter >= LEFT * own && noise <= MORE * whole && noise * WIDE <= across;
+                let is_scattered = scatter >= LEFT * own;
+                let is_noise = is_scattered && noise <= MORE * whole && noise * WIDE <= across;
                 let most = own * (1.0 + 3.0 * (2.0 / (count - 6.0)).sqrt()) + DETAIL * DETAIL;
                 surface.lacks_detail = between > most && !is_noise;
+                let [.., aa, ab, bb] = fit.coefficients;
+                let is_plane = 4.0 * (aa * aa + bb * bb) + 2.0 * ab * ab <= PLANE && noise * CLEAR <= across;
+                let is_deep = noise >= DEEP && own >= WITHIN * noise / (1.0 + SAMPLE * noise);
+                surface.is_plane_in_noise = is_plane && is_deep && is_scattered;
             }
             surface.noise = noise as f32;
             surface.is_curved = true;
@@ -273,10 +294,10 @@ impl Window {
     }
 
     /// The mean variance, across the surface, of the points behind the samples; the variance of one of them over a plane of its
-    /// own sample, which of noise is as large, of detail a little larger than the samples far less, and less too where hardly
-    /// any sample has more points than a plane takes; and the variance of the samples' heights over the surface. The first and
-    /// the last are over the mean of the surface at the points of a sample, which where it bends is not the surface at their
-    /// mean.
+    /// own sample, which of noise is as large, of detail a little larger than the samples far less, and infinite where the
+    /// samples have on average less than one point more than a plane takes, as that tells nothing; and the variance of the
+    /// samples' heights over the surface. The first and the last are over the mean of the surface at the points of a sample,
+    /// which where it bends is not the surface at their mean.
     fn spread(&self, quadric: &Quadric, total: f64) -> [f64; 3] {
         let Quadric { centre, slope, bend, .. } = *quadric;
         let [within, scatter, freedom, height, between] =
@@ -303,8 +324,9 @@ impl Window {
             });
         let share = 1.0 / total;
         let height = share * height;
+        let scatter = if freedom < total { f64::INFINITY } else { scatter / freedom };
         // Rounding may leave less than nothing.
-        [(share * within).max(0.0), scatter / freedom.max(total), (share * between - height * height).max(0.0)]
+        [(share * within).max(0.0), scatter, (share * between - height * height).max(0.0)]
     }
 }
 
@@ -543,6 +565,24 @@ mod tests {
                 assert!(lacks_detail(&|x, _| 2f32.sqrt() * (6.0 * x).sin()), "waves of {about}");
             }
         }
+    }
+
+    /// Wide noise on a plane, but nothing that is smooth from point to point, bent, or nearly as thick as wide.
+    #[test]
+    fn planes_in_noise_are_told() {
+        let is_told = |height: &dyn Fn(f32, &mut dyn FnMut() -> f32) -> f32| {
+            scattered(0.3, |x, uniform| height(x, uniform)).is_plane_in_noise
+        };
+        for deviation in [0.15, 0.25, 0.35] {
+            assert!(is_told(&|_, uniform| deviation * gauss(uniform)), "noise of {deviation}");
+            assert!(!is_told(&|x, _| deviation * 2f32.sqrt() * (6.0 * x).sin()), "waves of {deviation}");
+            assert!(
+                !is_told(&|x, uniform| 0.2 * x * x + deviation * gauss(uniform)),
+                "a bowl with noise of {deviation}"
+            );
+        }
+        assert!(!is_told(&|_, uniform| 0.08 * gauss(uniform)), "little noise");
+        assert!(!is_told(&|_, uniform| 1.4 * uniform()), "all of the cubes filled");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::around::Around;
 use super::choose::Chosen;
 use super::level::{Level, Role};
 use super::matrix::{dot_lanes, times_lanes};
-use super::surface::{SAMPLE, Surface};
+use super::surface::{SAMPLE, Surface, WITHIN};
 use super::tally::Tally;
 use super::{DIVISIONS, WHAT};
 use crate::error::Error;
@@ -47,8 +47,7 @@ const MISFIT: f32 = 2.0;
 /// Where all normals round a cube agree within so many radians, and the sum of their deviations, nothing needs a vote.
 const SMOOTH: f32 = 0.05;
 
-/// So many where noise decides: then the normals differ because of it, but no more than on one surface. And where the smallest
-/// neighbourhood knows its normal so well, a cube that looks noisy is: it need not be divided to see.
+/// So many where noise decides: then the normals differ because of it, but no more than on one surface.
 const SMOOTH_IN_NOISE: f32 = 0.12;
 
 /// Cubes whose surface rests on fewer points are not divided: the surfaces of the halves would rest on a quarter of them.
@@ -58,8 +57,8 @@ const DIVIDED_POINTS: f32 = 60.0;
 /// agrees with everything.
 const UNSURE: f32 = 0.07;
 
-/// The share of what noise leaves inside of samples that tells it.
-const WITHIN: f32 = 0.8;
+/// A cube is in noise where one in so many cubes near it is a plane in noise.
+const IN_NOISE: usize = 10;
 
 /// The cubes of a level, and the surfaces they rest on.
 pub(super) struct Vote<'a> {
@@ -122,20 +121,29 @@ impl<'a> Task<'a> {
         let mut smooth = None;
         if own.is_some() {
             self.around.near(&level.grid, brick, bit, 1, &mut self.near);
-            let is_noisy = self.is_noisy(own, surface);
+            // Whether noise decides: the cube rests on a larger neighbourhood than the smallest, and its points lie off the
+            // surface within the samples too. The sides of a thin wall are samples of their own. Waves shorter than a cube of
+            // the base look the same, so that is divided once all the same; and where the smallest neighbourhood does not
+            // know its normal it may be the tube of a ring, which from afar is a plane.
+            let within = own.noise / (1.0 + SAMPLE as f32 * own.noise);
+            let is_noisy = division > 0
+                && own.doublings > 0
+                && surface.error <= UNSURE
+                && surface.within >= WITHIN as f32 * within;
             let is_unsure = own.error > UNSURE;
             if !(can_divide && (is_unsure || !is_noisy && surface.lacks_detail)) {
                 self.ballot.invite(&self.near, chosen, f32::INFINITY);
                 let tolerance = if is_noisy { SMOOTH_IN_NOISE } else { SMOOTH };
                 smooth = self.ballot.smooth(own.quadric.centre, tolerance);
-                can_divide &= !(is_noisy && surface.error <= SMOOTH_IN_NOISE * SMOOTH_IN_NOISE);
             }
         }
         if smooth.is_none() {
-            if can_divide {
+            self.around.near(&level.grid, brick, bit, 2, &mut self.near);
+            // Else noise hides what the parts could tell, also of an edge in this very cube.
+            let in_noise = self.near.iter().filter(|(_, cube)| level.surfaces[*cube].is_plane_in_noise).count();
+            if can_divide && IN_NOISE * in_noise < self.near.len() {
                 return Role::Wanted;
             }
-            self.around.near(&level.grid, brick, bit, 2, &mut self.near);
             let noises = self.near.iter().map(|(_, cube)| chosen[*cube].flat_noise);
             self.ballot.invite(&self.near, chosen, quartile(noises));
         }
@@ -167,22 +175,6 @@ impl<'a> Task<'a> {
             self.vote.tally.add(division, own, count);
         }
         if smooth.is_some() && own.doublings > 0 { Role::Settled } else { Role::Near }
-    }
-
-    /// Whether noise decides in a cube: it and three quarters of the cubes near it rest on larger neighbourhoods than the
-    /// smallest, and their points lie off the surface within the samples too. The sides of a thin wall are samples of their
-    /// own. Waves shorter than a cube of the base look the same, so that is divided once all the same; and where the smallest
-    /// neighbourhood does not know its normal it may be the tube of a ring, which from afar is a plane. Dividing a noisy cube
-    /// would only take points away, and its parts would rest on the same surfaces.
-    fn is_noisy(&self, own: &Chosen, surface: &Surface) -> bool {
-        let is_coarse = |&&(_, cube): &&(Vec3, usize)| self.vote.chosen[cube].doublings > 0;
-        let coarse = self.near.iter().filter(is_coarse).count();
-        let within = own.noise / (1.0 + SAMPLE as f32 * own.noise);
-        self.vote.division > 0
-            && surface.error <= UNSURE
-            && own.doublings > 0
-            && 4 * coarse >= 3 * self.near.len()
-            && surface.within >= WITHIN * within
     }
 }
 
