@@ -4,7 +4,7 @@ use super::around::Around;
 use super::choose::Chosen;
 use super::level::{Level, Role};
 use super::matrix::{dot_lanes, times_lanes};
-use super::surface::{SAMPLE, Surface, WITHIN};
+use super::surface::{SAMPLE, WITHIN};
 use super::tally::Tally;
 use super::{DIVISIONS, WHAT};
 use crate::error::Error;
@@ -117,7 +117,7 @@ impl<'a> Task<'a> {
     fn settle(&mut self, brick: usize, cube: usize, bit: u32) -> Role {
         let Vote { level, chosen, division, .. } = *self.vote;
         let (own, surface) = (&chosen[cube], &level.surfaces[cube]);
-        let mut can_divide = division < DIVISIONS && surface.points >= DIVIDED_POINTS;
+        let can_divide = division < DIVISIONS && surface.points >= DIVIDED_POINTS;
         let mut smooth = None;
         if own.is_some() {
             self.around.near(&level.grid, brick, bit, 1, &mut self.near);
