@@ -81,6 +81,11 @@ impl Surface {
         self.error + self.error_growth * place.distance_squared(self.quadric.centre)
     }
 
+    /// Whether so much is left inside of its samples as there would be of noise of this variance.
+    pub fn shows(&self, noise: f32) -> bool {
+        self.within >= WITHIN * noise / (1.0 + SAMPLE as f32 * noise)
+    }
+
     /// Whether there is one.
     pub fn is_some(&self) -> bool {
         self.error < f32::INFINITY
@@ -89,13 +94,13 @@ impl Surface {
 
 /// One over the variance of points anywhere in a sample, which is half an edge wide: noise of a variance v leaves 1/(1/v + this)
 /// inside of samples.
-pub(super) const SAMPLE: f64 = 48.0;
+const SAMPLE: f64 = 48.0;
 
 /// So much of the noise must be left inside of samples: less does not tell how much there was.
 const CUT: f64 = 0.3;
 
 /// The share of what noise leaves inside of samples that tells it.
-pub(super) const WITHIN: f64 = 0.85;
+const WITHIN: f32 = 0.85;
 
 /// Parts of a cube know less than it where noise has so much variance, in square edges: a deviation of 0.11.
 const DEEP: f64 = 0.012;
@@ -202,7 +207,7 @@ impl Window {
                 surface.lacks_detail = between > most && !is_noise;
                 let [.., aa, ab, bb] = fit.coefficients;
                 let is_plane = 4.0 * (aa * aa + bb * bb) + 2.0 * ab * ab <= PLANE && noise * CLEAR <= across;
-                let is_deep = noise >= DEEP && own >= WITHIN * noise / (1.0 + SAMPLE * noise);
+                let is_deep = noise >= DEEP && surface.shows(noise as f32);
                 surface.is_plane_in_noise = is_plane && is_deep && is_scattered;
             }
             surface.noise = noise as f32;

@@ -4,7 +4,6 @@ use super::around::Around;
 use super::choose::Chosen;
 use super::level::{Level, Role};
 use super::matrix::{dot_lanes, times_lanes};
-use super::surface::{SAMPLE, WITHIN};
 use super::tally::Tally;
 use super::{DIVISIONS, WHAT};
 use crate::error::Error;
@@ -125,11 +124,7 @@ impl<'a> Task<'a> {
             // surface within the samples too. The sides of a thin wall are samples of their own. Waves shorter than a cube of
             // the base look the same, so that is divided once all the same; and where the smallest neighbourhood does not
             // know its normal it may be the tube of a ring, which from afar is a plane.
-            let within = own.noise / (1.0 + SAMPLE as f32 * own.noise);
-            let is_noisy = division > 0
-                && own.doublings > 0
-                && surface.error <= UNSURE
-                && surface.within >= WITHIN as f32 * within;
+            let is_noisy = division > 0 && own.doublings > 0 && surface.error <= UNSURE && surface.shows(own.noise);
             let is_unsure = own.error > UNSURE;
             if !(can_divide && (is_unsure || !is_noisy && surface.lacks_detail)) {
                 self.ballot.invite(&self.near, chosen, f32::INFINITY);
