@@ -106,7 +106,7 @@ const WITHIN: f32 = 0.85;
 const DEEP: f64 = 0.012;
 
 /// A surface that bends less in an edge, in radians and squared, may be a plane.
-const PLANE: f64 = 0.005;
+const PLANE: f64 = 0.004;
 
 /// And it is one where it is so many times as wide as thick, squared.
 const CLEAR: f64 = 3.5;
