@@ -97,5 +97,6 @@ fn deviation(points: &[Placed], normals: &[Vec3], gaps: &mut Vec<f32>) -> Option
         gaps[i - 1] = gaps[i] - gaps[i - 1];
     }
     gaps.pop();
-    Some(median(gaps) * points.len() as f32 / GAPS)
+    sort_few(gaps);
+    Some(gaps[gaps.len() / 2] * points.len() as f32 / GAPS)
 }
