@@ -48,6 +48,12 @@ const MOST_SQUARINGS: u32 = 5;
 /// How much the least of these powers counts beside the one that noise allows: across some edges there is nothing more.
 const BLUNT: f32 = 0.2;
 
+/// With less noise, in edges, patches of one cube are of different sheets: else noise may have parted one into layers.
+const CLEAN: f32 = 0.05;
+
+/// Added to the square of how far patches lie off each other's planes, in edges: less is no difference.
+const EVEN: f32 = 1e-3;
+
 /// Less is no evidence, and costs memory.
 const LEAST: f32 = 0.01;
 
@@ -58,7 +64,7 @@ impl Links {
     /// Links every patch to those in its cube and the 26 round it; `noise` is that of the points, in edges. One pass over the
     /// patches.
     pub fn of(grid: &Grid, patches: &Patches, noise: f32, stage: &Stage) -> Result<Self, Error> {
-        let squarings = squarings(noise);
+        let (squarings, is_clean) = (squarings(noise), noise < CLEAN);
         let runs = Filling::new(patches.all.len(), GRAPH)?;
         let lists = stage.collect(grid.blocks.len(), GRAPH, &|block| {
             let mut surroundings = Surroundings::new();
@@ -75,15 +81,23 @@ impl Links {
                     most += others.len();
                     near.push((others, NEAR[place as usize % 64].xyz()));
                 }
-                for own in patches.of_cube(cube) {
+                let all = patches.of_cube(cube);
+                for own in all.clone() {
                     grow(&mut links, most, GRAPH)?;
                     let (start, patch) = (links.len(), &patches.all[own]);
                     for (others, step) in &near {
                         for to in others.clone() {
-                            let evidence = evidence(patch, &patches.all[to], *step, squarings);
-                            if to != own && evidence.abs() > LEAST {
-                                links.push(Link { to: to as u32, evidence });
+                            let other = &patches.all[to];
+                            let mut evidence = evidence(patch, other, *step, squarings);
+                            if to == own || evidence.abs() <= LEAST {
+                                continue;
                             }
+                            if is_clean && (patch.has_rival || other.has_rival) && *step != Vec3::ZERO {
+                                // One product, so that it is the same to the bit from both ends.
+                                evidence *= share(patch, other, &patches.all[others.clone()], *step)
+                                    * share(other, patch, &patches.all[all.clone()], -*step);
+                            }
+                            links.push(Link { to: to as u32, evidence });
                         }
                     }
                     // SAFETY: a patch belongs to one cube, and a cube to one block.
@@ -179,14 +193,32 @@ fn evidence(a: &Patch, b: &Patch, step: Vec3, squarings: u32) -> f32 {
     if square < 4e-4 {
         return dot * dot * dot;
     }
-    let length = square.sqrt();
-    let (x, y) = (line.dot(a.normal) / length, line.dot(b.normal) / length);
-    let reflected = dot - 2.0 * (x * y);
-    let (x, y) = (x.abs(), y.abs());
+    let across = line.dot(a.normal) * line.dot(b.normal) / square;
+    let reflected = dot - 2.0 * across;
     let fourth = (reflected * reflected) * (reflected * reflected);
     let sharp = (LEAST_SQUARINGS..squarings).fold(fourth, |power, _| power * power);
     let trust = a.flatness * b.flatness * a.certainty().min(b.certainty()).sqrt();
-    reflected * ((sharp + BLUNT * fourth) / (1.0 + BLUNT)) * (1.0 - x * y) * trust
+    reflected * ((sharp + BLUNT * fourth) / (1.0 + BLUNT)) * (1.0 - across.abs()) * trust
+}
+
+/// A sheet goes on in one sheet: what is left of the evidence between two patches, from 1 down to 0, where a rival of the
+/// second one, of `all` in its cube, lies better in line with the first.
+#[inline(never)]
+fn share(a: &Patch, b: &Patch, all: &[Patch], step: Vec3) -> f32 {
+    // How far the two lie off each other's planes.
+    let off = |other: &Patch| {
+        let line = step + (other.centre - a.centre);
+        let (x, y) = (line.dot(a.normal), line.dot(other.normal));
+        x * x + y * y + EVEN
+    };
+    let mut share: f32 = 1.0;
+    let own = if b.has_rival { off(b) } else { EVEN };
+    if own > 2.0 * EVEN {
+        for rival in all.iter().filter(|rival| !std::ptr::eq(*rival, b)) {
+            share = share.min(off(rival) / (own * b.likeness(rival) * rival.certainty()));
+        }
+    }
+    share
 }
 
 #[cfg(test)]
@@ -194,7 +226,7 @@ mod tests {
     use super::*;
 
     fn patch(centre: Vec3, normal: Vec3) -> Patch {
-        Patch { centre, normal, points: 16, flatness: 1.0 }
+        Patch { centre, normal, points: 16, flatness: 1.0, has_rival: false }
     }
 
     #[test]
@@ -218,6 +250,18 @@ mod tests {
         let at = |noise: f32| evidence(&a, &b, Vec3::X, squarings(noise));
         assert!((0.0..0.1).contains(&at(0.0)), "{}", at(0.0));
         assert!(at(0.3) > 2.0 * at(0.0), "{}", at(0.3));
+    }
+
+    /// Sheets close to each other, as where balls touch: each goes on in itself.
+    #[test]
+    fn a_sheet_goes_on_in_one_sheet() {
+        let near = |height: f32| Patch { has_rival: true, ..patch(Vec3::new(0.0, 0.0, height), Vec3::Z) };
+        let (a, others) = (near(0.0), [near(0.0), near(0.1), patch(Vec3::ZERO, Vec3::X)]);
+        let shares = others.each_ref().map(|b| share(&a, b, &others, Vec3::X));
+        assert_eq!([shares[0], shares[2]], [1.0, 1.0]);
+        assert!(shares[1] < 0.1, "{shares:?}");
+        // Alone it goes on there too.
+        assert_eq!(share(&a, &others[1], &others[1..2], Vec3::X), 1.0);
     }
 
     #[test]

@@ -21,9 +21,16 @@ pub(super) struct Patch {
     pub points: u32,
     /// How well they lie on its plane, from 1 down to 0: beside a sharp edge some have the normal of the face beyond.
     pub flatness: f32,
+    /// Whether another one of its cube is alike but for its place, as that of the other side of a wall.
+    pub has_rival: bool,
 }
 
 impl Patch {
+    /// How alike another one is, from 1 down to 0, wherever the two lie.
+    pub fn likeness(&self, other: &Self) -> f32 {
+        self.normal.dot(other.normal).powi(16)
+    }
+
     /// How much there is of it, up to 1: few points may be anything.
     pub fn certainty(&self) -> f32 {
         (self.points as f32 / CERTAIN).min(1.0)
@@ -82,13 +89,16 @@ const COSINE_SQUARED: f32 = 0.72;
 
 /// How far from the plane of a patch a point may lie to join it, in edges: little, because thin walls have both sides in one
 /// cube; but noise must not tear a surface into layers, so no less than so many times the noise.
-const THICKNESS: f32 = 0.1;
+const THICKNESS: f32 = 0.07;
 const DEVIATIONS: f32 = 2.2;
 
 /// Points that lie so far from their plane, in edges, make half of a patch's flatness, or so many times the noise if that is
 /// more.
 const UNEVEN: f32 = 0.04;
 const UNEVEN_DEVIATIONS: f32 = 4.0;
+
+/// Patches less alike than so, as those of the two faces of an edge, are no rivals.
+const UNLIKE: f32 = 0.1;
 
 /// Patches of so many points are certain.
 const CERTAIN: f32 = 8.0;
@@ -205,7 +215,7 @@ fn split(
         }
         let number = best.unwrap_or(own.len());
         if number == own.len() {
-            patches.push(Patch { centre: Vec3::ZERO, normal: Vec3::ZERO, points: 0, flatness: 0.0 });
+            patches.push(Patch { centre: Vec3::ZERO, normal: Vec3::ZERO, points: 0, flatness: 0.0, has_rival: false });
         }
         // Sums until all are in.
         let patch = &mut patches[first + number];
@@ -226,8 +236,9 @@ fn split(
         let off = (points[i as usize].local - centre - patch.centre).dot(patch.normal);
         patch.flatness += off * off;
     }
-    for patch in own {
-        patch.flatness = limits.flatness(patch.flatness, patch.points);
+    for i in 0..own.len() {
+        own[i].flatness = limits.flatness(own[i].flatness, own[i].points);
+        own[i].has_rival = (0..own.len()).any(|other| other != i && own[i].likeness(&own[other]) > UNLIKE);
     }
 }
 
@@ -248,7 +259,13 @@ fn whole(points: &[Placed], normals: &[Vec3], centre: Vec3, limits: Limits) -> O
         squares += off * off;
     }
     let count = points.len() as u32;
-    Some(Patch { centre: place - centre, normal, points: count, flatness: limits.flatness(squares, count) })
+    Some(Patch {
+        centre: place - centre,
+        normal,
+        points: count,
+        flatness: limits.flatness(squares, count),
+        has_rival: false,
+    })
 }
 
 /// A normal, or its opposite if that is more like `other`.
