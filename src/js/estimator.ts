@@ -148,6 +148,7 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
     want(options, 'options', options, 'an object');
     const { signal, onProgress } = options;
     want((onProgress ?? want).call, 'onProgress', onProgress, 'a function');
+    want((signal ?? AbortSignal.prototype).throwIfAborted, 'signal', signal, 'an AbortSignal');
     signal?.throwIfAborted();
     let told = 0;
     let thrown: [unknown] | undefined;
