@@ -6,8 +6,6 @@ import { createRequire } from 'node:module';
 import { availableParallelism } from 'node:os';
 import { join } from 'node:path';
 import { parseArgs } from 'node:util';
-import { REVISION } from 'three';
-import { PLYLoader } from 'three/addons/loaders/PLYLoader.js';
 import { build } from '../scripts/build.mjs';
 import { Failure, fromUser, main, root, tell } from '../scripts/run.mjs';
 import { setup } from '../scripts/setup.mjs';
@@ -40,7 +38,7 @@ async function timed(read, runs = RUNS) {
 }
 
 /** All readers, each from an ArrayBuffer to what its users get: by name. */
-async function readers(createEstimator) {
+async function readers(createEstimator, PLYLoader) {
   const require = createRequire(join(setupNpm('loaders.gl', LOADERS), 'package.json'));
   const [core, ply] = ['core', 'ply'].map((name) => require(`@loaders.gl/${name}`));
   const three = new PLYLoader();
@@ -86,14 +84,14 @@ const verdicts = (rows) =>
     ),
   );
 
-function report(rows, points) {
+function report(rows, points, revision) {
   const { model, cores, node, date } = machine();
   const names = Object.keys(rows[0].found);
   const spread = (times) => `${milliseconds(Math.min(...times))} to ${milliseconds(Math.max(...times))}`;
   return `${paragraphs(
     '# Reading, measured',
     'Written by `npm run bench:ply`, text and all; not to be edited.',
-    `${model}, ${cores} cores, Node ${node}, ${date}. Files of ${points / 1e6} million points with colours, in memory as an ArrayBuffer. Ours is all that the caller waits for: the copy of the file that the worker gets, reading it there, and the arrays on their way back. The others read in the calling thread. “Copy” is one into an array that is in use, “into new memory” \`ArrayBuffer.slice\`, as all readers make arrays. ${LOADERS.join(', ')}, three.js r${REVISION}.`,
+    `${model}, ${cores} cores, Node ${node}, ${date}. Files of ${points / 1e6} million points with colours, in memory as an ArrayBuffer. Ours is all that the caller waits for: the copy of the file that the worker gets, reading it there, and the arrays on their way back. The others read in the calling thread. “Copy” is one into an array that is in use, “into new memory” \`ArrayBuffer.slice\`, as all readers make arrays. ${LOADERS.join(', ')}, three.js r${revision}.`,
     '## What is asked',
     table(['file', 'reader', 'against', 'asked', 'ratio', 'verdict'], verdicts(rows)),
     '## Milliseconds, medians, and from the least to the most',
@@ -113,9 +111,12 @@ await main(async () => {
   setup();
   build();
   const { createEstimator } = await import('../dist/node.js');
+  // Not before the set-up, which installs it.
+  const { REVISION } = await import('three');
+  const { PLYLoader } = await import('three/addons/loaders/PLYLoader.js');
   const points = values.small ? 50_000 : 2_000_000;
   const positions = sphere(points);
-  const { list, close } = await readers(createEstimator);
+  const { list, close } = await readers(createEstimator, PLYLoader);
   const rows = [];
   try {
     for (const [kind, file] of [
@@ -136,6 +137,6 @@ await main(async () => {
   }
   const out = fromUser(values.out) ?? join(root, 'docs');
   mkdirSync(out, { recursive: true });
-  writeFileSync(join(out, 'reading.md'), report(rows, points));
+  writeFileSync(join(out, 'reading.md'), report(rows, points, REVISION));
   tell(`ply: written to ${values.out ?? 'docs'}/reading.md`);
 });
