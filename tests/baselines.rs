@@ -361,7 +361,7 @@ fn knn_agrees_with_other_libraries() {
     }
 }
 
-/// The table of exact neighbours of METHOD.md: root mean square angles in degrees of k = 16, 30 and 100.
+/// Root mean square angles in degrees of k = 16, 30 and 100, as a first program with exact neighbours had them.
 #[test]
 fn knn_has_the_accuracy_of_the_prototype() {
     const COUNT: usize = 200_000;

@@ -5,7 +5,7 @@ import { median } from '../median.mjs';
 import { CLASSED, OURS, exponent } from './experiments.mjs';
 import { error, milliseconds, percent, range, ratio } from './format.mjs';
 
-/** The bar: our method against our own baselines, so many times faster on every row. */
+/** Our own bar: our method is so many times faster than our baselines on every row. */
 export const BAR = { knn: 10, egg: 20 };
 
 /** All clouds whose methods were compared, in the order of the report. */

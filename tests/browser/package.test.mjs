@@ -1,5 +1,5 @@
-// The packed package in a browser, loaded in each way that API.md promises: plain files on the page's own origin, a
-// host on another origin, and a bundle; with and without isolation.
+// The packed package in a browser, loaded in each way that docs/embedding.md promises: plain files on the page's own origin,
+// a host on another origin, and a bundle; with and without isolation.
 import assert from 'node:assert/strict';
 import { existsSync, mkdirSync, readFileSync, renameSync, symlinkSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
