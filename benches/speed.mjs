@@ -20,7 +20,6 @@ import { report } from './speed/report.mjs';
 const SIZES = [187_500, 750_000, 3_000_000, 12_000_000];
 const SMALL_SIZES = [50_000, 100_000];
 const CELLS = ['0.5', '1.5', 'auto'];
-const SCAN = '../shared/data/scans/las_ahn3_cropped.ply.gz';
 /** Where the clouds lie for all engines to read; below the root, so that the browser can be served from there. */
 const FOLDER = 'target/bench';
 const OPTIONS = {
@@ -37,13 +36,10 @@ async function* clouds(sizes, scan, readPointCloud) {
     yield { shape: 'sphere', size, order: 'random', positions: random };
     yield { shape: 'sphere', size, order: 'sorted', positions: sorted(random) };
   }
-  const file = scan ? fromUser(scan) : join(root, SCAN);
-  if (existsSync(file)) {
-    const bytes = readFileSync(file);
-    const { count, positions } = await readPointCloud(file.endsWith('.gz') ? gunzipSync(bytes) : bytes);
+  if (scan) {
+    const bytes = readFileSync(scan);
+    const { count, positions } = await readPointCloud(scan.endsWith('.gz') ? gunzipSync(bytes) : bytes);
     yield { shape: 'scan', size: count, order: 'as it is', positions };
-  } else if (scan) {
-    throw new Failure(`no file ${scan}`);
   } else {
     tell('bench: no real scan (give one by --scan FILE.ply)');
   }
@@ -54,6 +50,8 @@ await main(async () => {
   const runs = Number(values.runs);
   if (!(Number.isInteger(runs) && runs > 0))
     throw new Failure(`--runs is ${values.runs}; wanted a whole number above 0`);
+  const scan = fromUser(values.scan);
+  if (scan && !existsSync(scan)) throw new Failure(`no file ${values.scan}`);
   setup();
   build();
   buildPage();
@@ -63,11 +61,7 @@ await main(async () => {
   const rows = [];
   let drop;
   try {
-    for await (const { positions, ...cloud } of clouds(
-      values.small ? SMALL_SIZES : SIZES,
-      values.scan,
-      node.readPointCloud,
-    )) {
+    for await (const { positions, ...cloud } of clouds(values.small ? SMALL_SIZES : SIZES, scan, node.readPointCloud)) {
       const file = `${FOLDER}/cloud.f32`;
       writeFileSync(join(root, file), positions);
       const engines = enginesOf(node.createEstimator, opened?.page);
