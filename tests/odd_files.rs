@@ -1,13 +1,14 @@
-//! Real and odd files, where they are there: a folder `../shared/data` beside the project, with manifests.
+//! Real and odd files, where they are there: in the folder that `BILINORMAL_DATA` names, or in `../shared/data` beside the
+//! project, with manifests. (None of them is part of the project.)
 
 mod reference;
 
 use bilinormal::ply::{self, Additions, ReadOptions};
 use bilinormal::{Error, Progress};
 use reference::Ply;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::{env, fs};
 
 /// What reading a file must give.
 #[derive(Clone, Copy, Debug)]
@@ -69,11 +70,12 @@ const ODD: [(&str, Wanted); 43] = [
 const TEXT_ONLY: [&str; 2] = ["trimesh__fuze_ascii.ply", "made_int_ascii_float_values.ply"];
 
 fn data(folder: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data").join(folder);
+    let all = env::var("BILINORMAL_DATA").unwrap_or("../shared/data".into());
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(all).join(folder);
     if path.is_dir() {
         return Some(path);
     }
-    println!("skipped: no folder ../shared/data/{folder}");
+    println!("skipped: no folder {}", path.display());
     None
 }
 

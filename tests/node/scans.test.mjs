@@ -1,15 +1,16 @@
-// Real and odd files, where the project stands beside the folder that has them. (None of them is part of the project.)
+// Real and odd files, where they are there: in the folder that `BILINORMAL_DATA` names, or in `../shared/data` beside the
+// project. (None of them is part of the project.)
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { existsSync, readFileSync, readdirSync, writeFileSync } from 'node:fs';
-import { join } from 'node:path';
+import { join, resolve } from 'node:path';
 import { after, before, describe, test } from 'node:test';
 import { pathToFileURL } from 'node:url';
 import { gunzipSync } from 'node:zlib';
 import { installPacked, root } from './packed.mjs';
 import { parsePly, propertyOf, withoutNormals } from './ply.mjs';
 
-const data = join(root, '..', 'shared', 'data');
+const data = resolve(root, process.env.BILINORMAL_DATA ?? '../shared/data');
 const filesIn = (folder) => readdirSync(join(data, folder)).filter((name) => /\.ply(\.gz)?$/.test(name));
 
 if (!existsSync(data)) {
