@@ -13,7 +13,7 @@ import { setup } from '../scripts/setup.mjs';
 import { sorted, sphere } from './clouds.mjs';
 import { machine } from './machine.mjs';
 import { median } from './median.mjs';
-import { paragraphs, table, verdict } from './paper/format.mjs';
+import { paragraphs, table, verdict } from './format.mjs';
 import { setupNpm } from './peers/npm.mjs';
 import { linesOf } from './peers/run.mjs';
 

@@ -12,7 +12,7 @@ import { setup } from '../scripts/setup.mjs';
 import { sphere } from './clouds.mjs';
 import { machine } from './machine.mjs';
 import { median } from './median.mjs';
-import { milliseconds, paragraphs, table, verdict } from './paper/format.mjs';
+import { milliseconds, paragraphs, table, verdict } from './format.mjs';
 import { setupNpm } from './peers/npm.mjs';
 import { asciiPly, binaryPly } from './speed/ply.mjs';
 

@@ -1,6 +1,6 @@
 // Rows to text: docs/accuracy.md.
 
-import { count, paragraphs, percent, sources, table } from '../paper/format.mjs';
+import { count, paragraphs, percent, sources, table } from '../format.mjs';
 import { VARIANTS } from './clouds.mjs';
 import { LIMITS } from './judge.mjs';
 import { ALL, ENOUGH, JET, KNN, LEAST, METHODS, NEIGHBOURS, RUNS, geometricMean } from './measure.mjs';

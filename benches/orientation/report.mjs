@@ -1,7 +1,7 @@
 // Rows to text: docs/orientation-bench.md.
 
 import { median } from '../median.mjs';
-import { paragraphs, percent, sources, table, verdict } from '../paper/format.mjs';
+import { paragraphs, percent, sources, table, verdict } from '../format.mjs';
 import { MOST_SECONDS, counted, verdicts } from './judge.mjs';
 import { ENOUGH, MODES, RUNS, THICK } from './measure.mjs';
 

@@ -3,7 +3,7 @@
 import * as article from './article.mjs';
 import { median } from '../median.mjs';
 import { CLASSED, OURS, exponent } from './experiments.mjs';
-import { error, milliseconds, percent, range, ratio } from './format.mjs';
+import { error, milliseconds, percent, range, ratio } from '../format.mjs';
 
 /** Our own bar: our method is so many times faster than our baselines on every row. */
 export const BAR = { knn: 10, egg: 20 };

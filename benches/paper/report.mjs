@@ -5,7 +5,7 @@ import { chart } from './chart.mjs';
 import { BAR, bar, claims, compared, ratios } from './claims.mjs';
 import { median } from '../median.mjs';
 import { CLASSED, OURS, VARIANTS } from './experiments.mjs';
-import { count, degrees, error, millions, milliseconds, paragraphs, percent, range, ratio, table } from './format.mjs';
+import { count, degrees, error, millions, milliseconds, paragraphs, percent, range, ratio, table } from '../format.mjs';
 import { WRONG } from './deviation.mjs';
 
 const BASELINES = { knn: 'ENN', egg: 'EGG' };

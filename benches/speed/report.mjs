@@ -2,7 +2,7 @@
 
 import { machine } from '../machine.mjs';
 import { median } from '../median.mjs';
-import { paragraphs, range, table, verdict } from '../paper/format.mjs';
+import { paragraphs, range, table, verdict } from '../format.mjs';
 import { THREADS } from './engines.mjs';
 
 /** Of fixed cells, and of 'auto'. */
