@@ -8,7 +8,7 @@ import { nearestNeighbours } from './neighbours.mjs';
 import { SHAPES } from './shapes.mjs';
 
 export const NEIGHBOURS = [10, 16, 30, 100, 250];
-export const SCALES = [0.4, 1, 1.5, 3];
+const SCALES = [0.4, 1, 1.5, 3];
 
 const named = (values, name) => values.map((value) => [name(value), value]);
 /** The methods of the package, `{ name: options }`. */

@@ -2,6 +2,7 @@
 
 import { freeForm, sphere } from '../clouds.mjs';
 import { median } from '../median.mjs';
+import { SPHERES } from './article.mjs';
 import { classes } from './classes.mjs';
 import { deviations, summary } from './deviation.mjs';
 
@@ -26,7 +27,7 @@ export const CLASSED = ['0.4 L', '1.0 L'];
  * what is short must not meet other conditions than what is long.
  */
 export const FULL = {
-  spheres: [187_500, 375_000, 750_000, 1_500_000, 3_000_000],
+  spheres: SPHERES,
   freeForm: 712_000,
   sweep: 750_000,
   factors: [0.3, 0.4, 0.5, 0.8, 1, 1.2, 1.5, 2, 2.4, 3, 4, 5, 6],
