@@ -1,22 +1,12 @@
 // How far normals are from the true ones, sign aside.
 
-/**
- * The deviation |n - n_true| of every point, of the sign that makes it smaller. `truth` need not have length one; a zero
- * normal counts as a right angle.
- */
-export function deviations(normals, truth) {
-  const result = new Float64Array(normals.length / 3);
-  for (let i = 0, at = 0; i < result.length; i++, at += 3) {
-    const [x, y, z] = [truth[at], truth[at + 1], truth[at + 2]];
-    const [nx, ny, nz] = [normals[at], normals[at + 1], normals[at + 2]];
-    // By the cross product: the cosine of a small angle has no digits left.
-    const across = Math.hypot(y * nz - z * ny, z * nx - x * nz, x * ny - y * nx);
-    const along = Math.abs(x * nx + y * ny + z * nz);
-    const angle = across === 0 && along === 0 ? Math.PI / 2 : Math.atan2(across, along);
-    result[i] = 2 * Math.sin(angle / 2);
-  }
-  return result;
-}
+import { angles } from '../accuracy/judge.mjs';
+
+/** How long the difference is of two unit vectors so many degrees apart. */
+const chord = (degrees) => 2 * Math.sin((degrees * Math.PI) / 360);
+
+/** The deviation |n - n_true| of every point, of the sign that makes it smaller; a zero normal counts as a right angle. */
+export const deviations = (normals, truth) => angles(normals, truth).map(chord);
 
 const degrees = (deviation) => (2 * Math.asin(deviation / 2) * 180) / Math.PI;
 /** Normals that are farther off count as wrong. */
@@ -25,7 +15,7 @@ export const WRONG = 10;
 /** Mean and root mean square, the median, the worst angle in degrees, and the share that is more than `WRONG` degrees off. */
 export function summary(values) {
   let [sum, squares, worst, wrong] = [0, 0, 0, 0];
-  const limit = 2 * Math.sin((WRONG * Math.PI) / 360);
+  const limit = chord(WRONG);
   for (const value of values) {
     sum += value;
     squares += value * value;
