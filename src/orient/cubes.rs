@@ -18,7 +18,7 @@ const POINTS_PER_CELL: f64 = 16.0;
 /// With more noise, in edges, the cubes are too small: points anywhere in a cube have 0.31.
 const LARGEST_NOISE: f32 = 0.28;
 const ENLARGEMENT: f32 = 1.25;
-const ENLARGEMENTS: u32 = 3;
+const LARGEST: f32 = ENLARGEMENT * ENLARGEMENT * ENLARGEMENT;
 
 /// The cubes, and the noise in their edges. Sorts the points once, noisy ones twice.
 pub(super) fn sort(
@@ -34,17 +34,14 @@ pub(super) fn sort(
     };
     let edge = density.edge(POINTS_PER_CELL);
     let grid = sort(edge, &stage.part(0.0..0.5))?;
-    let mut scale = 1.0;
-    let mut found = noise(&grid, normals, scale);
-    for _ in 0..ENLARGEMENTS {
-        if found <= LARGEST_NOISE {
-            break;
-        }
-        scale *= ENLARGEMENT;
-        found = noise(&grid, normals, scale);
-    }
-    if scale == 1.0 {
+    let found = noise(&grid, normals, 1.0);
+    if found <= LARGEST_NOISE {
         return Ok((grid, found));
+    }
+    let mut scale = ENLARGEMENT;
+    // The largest are taken whatever their noise.
+    while scale < LARGEST && noise(&grid, normals, scale) > LARGEST_NOISE {
+        scale *= ENLARGEMENT;
     }
     drop(grid);
     let grid = sort(f64::from(scale) * edge, &stage.part(0.5..1.0))?;
