@@ -295,12 +295,12 @@ fn gather(links: &Links, group: &[u32], flipped: &[bool], groups: usize) -> Resu
 #[inline(never)]
 fn mend(links: &Links, across: Option<&Links>, own: &dyn Fn(usize) -> f32, flipped: &mut [bool]) -> Result<(), Error> {
     /// More flip next to nothing.
-    const ROUNDS: usize = 16;
+    const MENDING_ROUNDS: usize = 16;
     /// Less is rounding.
     const LEAST: f32 = 1e-6;
     // Whose neighbours changed since it was asked.
     let mut is_stirred = filled(true, flipped.len(), GRAPH)?;
-    for _ in 0..ROUNDS {
+    for _ in 0..MENDING_ROUNDS {
         let mut any = false;
         for one in 0..flipped.len() {
             if !std::mem::take(&mut is_stirred[one]) {
