@@ -45,8 +45,14 @@ pub(crate) fn sort_few<T: Copy + PartialOrd>(list: &mut [T]) {
     const FEW: usize = 32;
     if list.len() > FEW {
         list.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
-        return;
+    } else {
+        insert_each(list);
     }
+}
+
+/// Sorts a list without NaN by insertion: in few steps if it is short, or sorted but for little.
+#[inline(always)]
+pub(crate) fn insert_each<T: Copy + PartialOrd>(list: &mut [T]) {
     for end in 1..list.len() {
         let one = list[end];
         let mut place = end;

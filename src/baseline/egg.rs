@@ -10,6 +10,7 @@
 //! weigh the same; where they do not determine a surface, the plane stands in.
 
 use super::tree::{Neighbour, Place};
+use crate::order::insert_each;
 use crate::pca::{Moments, Plane};
 use glam::{DVec3, Vec3};
 
@@ -34,7 +35,8 @@ pub(super) fn tangent_plane(
     nearest: &mut [Neighbour],
     edges: &mut Vec<DVec3>,
 ) -> Option<Plane> {
-    sort(nearest);
+    // By distance. The graph takes as many steps.
+    insert_each(nearest);
     let others = nearest.iter().map(|neighbour| neighbour.place as usize).filter(|place| *place != point);
     let relative = |place: usize| places[place].position - places[point].position;
     // Not that of the last one: in single precision the squares that order them may all be zero.
@@ -54,16 +56,6 @@ pub(super) fn tangent_plane(
         plane.normal = normal.as_vec3();
     }
     Some(plane)
-}
-
-/// Sorts by distance. By insertion: there are few, and the graph takes as many steps.
-fn sort(nearest: &mut [Neighbour]) {
-    for end in 1..nearest.len() {
-        let neighbour = nearest[end];
-        let place = nearest[..end].iter().rposition(|before| before.order < neighbour.order).map_or(0, |i| i + 1);
-        nearest.copy_within(place..end, place + 1);
-        nearest[place] = neighbour;
-    }
 }
 
 /// Of some points relative to the origin, in the order of their distances, keeps the origin's neighbours in the graph.

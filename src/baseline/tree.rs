@@ -160,8 +160,8 @@ fn longest_side(places: &[Place]) -> u32 {
     (bounds.1 - bounds.0).max_position() as u32
 }
 
-/// One of the nearest points.
-#[derive(Clone, Copy, Debug)]
+/// One of the nearest points; ordered by the first field, of which no two are equal.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub(super) struct Neighbour {
     /// The squared distance in single precision, then the number of the point: in the order of distance, and of two at
     /// one distance the one that comes first in the input. No distance is negative, so its bits have its order.
