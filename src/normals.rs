@@ -73,7 +73,8 @@ impl Normals {
     }
 }
 
-/// When more directions than these are gathered, they are written: with four more they take 4 KiB, and as much again as rows.
+/// Directions gathered before they are written. Four more may come at once, so there is room for 256: 4 KiB, and 4 KiB of
+/// rows.
 const GATHERED: usize = 252;
 
 /// Takes directions, and writes the unit normals of a task. They go to places all over the memory, and every place has to be
@@ -96,8 +97,8 @@ impl Writer<'_> {
         cfg!(feature = "full") && self.normals.curvature.is_some()
     }
 
-    /// Takes the direction of the normal of a point, of either sign and of any length above [`SHORT`]; zero if nothing
-    /// determines it.
+    /// Takes the direction of the normal of a point: of either sign and any length from 1e-19 on, or exactly zero if nothing
+    /// determines it. Callers replace what is shorter than [`SHORT`].
     ///
     /// # Safety
     /// At most once for each point.
@@ -107,8 +108,8 @@ impl Writer<'_> {
         unsafe { self.write_lanes(Vec4::splat(f32::from_bits(point)), 1, direction.to_array().map(Vec4::splat)) };
     }
 
-    /// Takes the directions of `count` points, one to four, lane by lane, as [`Writer::write`] does; those too short become zero.
-    /// `points` has the bits of their numbers.
+    /// Takes the directions of `count` points, one to four, lane by lane, as [`Writer::write`] does. `points` has the bits
+    /// of their numbers.
     ///
     /// # Safety
     /// At most once for each point, which is written later.
@@ -147,7 +148,7 @@ impl Writer<'_> {
             let [x, y, z, points] = self.gathered.each_ref().map(|row| load(&row[4 * four..]));
             let [x, y, z] = [0, 1, 2].map(|i| a[i] * x + b[i] * y + c[i] * z);
             let square = x * x + y * y + z * z;
-            // Zero stays zero.
+            // Zero stays zero: this is the square of 1e-19.
             let scale = inverse_root(square.max(Vec4::splat(f32::MIN_POSITIVE)));
             let [x, y, z] = face([x, y, z].map(|lanes| lanes * scale));
             rows.copy_from_slice(&transposed([x, y, z, points]).map(|row| row.to_array()));

@@ -18,7 +18,7 @@ pub(super) struct Chosen {
     pub quadric: Quadric,
     /// Variance of the points' distances from it.
     pub noise: f32,
-    /// By how much that is exceeded by chance: one standard deviation, as a factor.
+    /// Relative standard deviation of `noise`: the root of 2 / points.
     pub chance: f32,
     /// Variance of the angle of the normal, with what the surface does not fit; infinite if there is no surface.
     pub error: f32,
@@ -55,7 +55,7 @@ impl Chosen {
     }
 }
 
-/// A residual exceeds the noise of smaller neighbourhoods when it does so by this many standard deviations.
+/// A residual counts as more than the noise of smaller neighbourhoods only beyond this many standard deviations.
 const EXCESS: f32 = 6.0;
 
 /// The square angle that a misfit of the size of the neighbourhood is taken for.

@@ -40,8 +40,8 @@ pub(super) enum Role {
     Settled,
 }
 
-/// The sums of a cube's own samples count whole in its surface, those of a cube beyond its side this much, beyond an edge
-/// the square of it, beyond a corner the cube.
+/// The weight of a neighbouring cube's samples in a surface: this across a face, its square across an edge, its cube across
+/// a corner; own samples weigh 1.
 const NEXT: f32 = 0.6;
 
 impl Level {

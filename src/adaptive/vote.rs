@@ -27,7 +27,7 @@ const FALL: f32 = 0.35;
 /// `FALL`.
 const END: f32 = 2.0;
 
-/// Further than so beyond its end a surface counts no less: `fade` bears no more.
+/// The least argument for `fade`, whose pole is at -16: farther beyond its end a surface counts no less.
 const BEYOND: f32 = -8.0;
 
 /// No surface is trusted more than to a thousandth of a radian, squared.
@@ -36,7 +36,8 @@ const ANGLE_FLOOR: f32 = 1e-6;
 /// Nor lies nearer to a point than 0.0003 edges, squared.
 const DISTANCE_FLOOR: f32 = 9e-8;
 
-/// No more noise than so many times that of the place, a low quartile of what is known by few points, is a misfit.
+/// Noise is a misfit only beyond this many times the noise of the place: the lower quartile of that of the flat surfaces
+/// around.
 const NOISIER: f32 = 1.25;
 
 /// The square angle that a misfit of one square edge is taken for, however wide the surface is: a thin plate or a row of waves

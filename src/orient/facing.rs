@@ -13,10 +13,9 @@ use crate::progress::Stage;
 /// What errors call the memory of all this.
 const WHAT: &str = "the facing of surfaces";
 
-/// A surface is told by looks, each as much as a ray that hits it head-on, if the square of their balance is so many times
-/// their sum: by more than sixteen at one side, by a hundred at one and fifty at the other. With twelve, roofs that look at each
-/// other under the edge that their missing walls leave turn some of them. The largest surface is what the others stand on or
-/// before, so fewer tell.
+/// A side is decided when the square of the balance is more than this times the total, both in looks head-on: by more than
+/// 16 all on one side, or by 100 against 50. With 12, roofs that look at each other under the edge that their missing walls
+/// leave turn some of them. The largest surface is what the others stand on or before, so fewer decide.
 const SURE: f64 = 16.0;
 const SURE_OF_LARGEST: f64 = 5.0;
 

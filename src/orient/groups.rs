@@ -98,9 +98,8 @@ impl Groups {
         Ok(flipped)
     }
 
-    /// The same where what speaks for a sign by itself may mislead. For the patches of a group that adds up like its area, the
-    /// evidence of its neighbours only like its rim: the former is made to grow like that too. Instead the looks of its patches
-    /// at each other count.
+    /// Signs for components whose evidence from the air may mislead. It adds up with a group's area, that of links only with
+    /// its rim; so here it is divided by the root of the group's size, and looks between its patches are added.
     pub fn cautious_signs(&self, looks: &Looks, sights: &Sights, stage: &Stage) -> Result<Vec<bool>, Error> {
         let mut links = self.across_the_air(looks, sights)?;
         let mut levels = Vec::new();
@@ -146,8 +145,8 @@ impl Groups {
     }
 }
 
-/// Groups that agree no better than this, for each patch but one along the side of a square of as many as the smaller has, only
-/// touch: they are surfaces of their own. One patch is none.
+/// Two groups only touch, and stay two surfaces, if the evidence between them is at most this times (root of n, less 1), n
+/// the patches of the smaller: about its side in patches. A single patch always joins.
 const TOUCH: f32 = 0.1;
 
 /// How often groups merge at the most; five to twelve times is what scans need.

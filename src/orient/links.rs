@@ -37,8 +37,8 @@ struct Run {
     end: usize,
 }
 
-/// The likeness of two patches is raised to about this over the variance of the noise: that moves patches off their surface, and
-/// so makes them unlike; what more makes them so is that they are of two.
+/// Likeness is raised to about this over the variance of the noise: noise alone makes patches of one surface a little
+/// unlike; what it does not explain means two surfaces.
 const SHARPNESS: f32 = 0.2;
 
 /// How often it is squared at least and at most: noise is not all that makes patches of one surface unlike.

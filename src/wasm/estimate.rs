@@ -32,7 +32,7 @@ pub fn estimate(
     })?;
     let estimation = Object::new();
     set(&estimation, "normals", Buffer::from(normals));
-    // Only the module with everything finds these, here and below; the other need not know how they are told.
+    // Only the full module has these; the `cfg!` keeps their code out of the core, here and below.
     if cfg!(feature = "full")
         && let Some(curvature) = curvature
     {
