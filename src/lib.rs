@@ -22,7 +22,7 @@
 //!
 //! Features, both on by default: `parallel`, loops over rayon; `full`, all options but the default ones. Needs a nightly
 //! compiler, for the two features of the language below: that of `rust-toolchain.toml` in the repository.
-#![warn(missing_docs)]
+#![warn(missing_docs, clippy::missing_errors_doc)]
 // What runs once in a call is compiled for size: the modules that browsers download must stay small.
 #![feature(optimize_attribute)]
 // The square roots of four lanes at once.

@@ -87,6 +87,9 @@ impl Orient {
 
 impl Options {
     /// Refuses values out of range, and without the feature `full` what this build does not offer.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with what came and what was wanted, [`Error::Unsupported`] for what this build does not offer.
     pub fn validate(&self) -> Result<(), Error> {
         if !cfg!(feature = "full") {
             let refusal = || Error::Unsupported("this build has the default options only".into());

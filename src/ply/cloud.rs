@@ -14,7 +14,8 @@ use crate::progress::Progress;
 /// the cloud's. Little-endian, or text with `ascii`. Takes memory for the output, checked first; for text also for the
 /// file that is not text.
 ///
-/// Errors: [`Error::Input`] for arrays of different lengths, [`Error::Limit`] for too little memory.
+/// # Errors
+/// [`Error::Input`] for arrays of different lengths, [`Error::Limit`] for too little memory.
 pub fn write_cloud(cloud: &PointCloud, add: &Additions, ascii: bool) -> Result<Vec<u8>, Error> {
     let count = cloud.len();
     let normals = add.normals.or(cloud.normals.as_deref());

@@ -27,8 +27,9 @@ const BLOCK: usize = 1 << 10;
 /// counts of a header are checked against the file first. Time is linear in the file, shared among threads, and the
 /// result is the same for any number of them.
 ///
-/// Errors: [`Error::Format`] with the line or byte for a file that is not right or not PLY, [`Error::Input`] for more
-/// points than `max_points`, [`Error::Limit`] for too little memory, [`Error::Cancelled`].
+/// # Errors
+/// [`Error::Format`] with the line or byte for a file that is not right or not PLY, [`Error::Input`] for more points
+/// than `max_points`, [`Error::Limit`] for too little memory, [`Error::Cancelled`].
 #[optimize(size)]
 pub fn read(file: &[u8], options: &ReadOptions, progress: &Progress) -> Result<PointCloud, Error> {
     progress.update("read", 0.0)?;

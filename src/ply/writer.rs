@@ -23,7 +23,8 @@ use std::sync::{Mutex, PoisonError};
 ///
 /// Takes memory for the output, checked first. Time is linear in the file.
 ///
-/// Errors: those of [`read`](super::read) for the file; [`Error::Input`] for additions of another length than the file's;
+/// # Errors
+/// Those of [`read`](super::read) for the file; [`Error::Input`] for additions of another length than the file's;
 /// [`Error::Format`] for text that its declared type cannot hold, when the output is binary.
 pub fn write(file: &[u8], add: &Additions, ascii: bool, progress: &Progress) -> Result<Vec<u8>, Error> {
     progress.update("write", 0.0)?;
