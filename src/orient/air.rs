@@ -154,12 +154,10 @@ impl Voxels {
         // Two bytes a point, and no less than is done at once.
         let most = (16.0 * points as f64).max(4e6);
         let volume = |size: IVec3| f64::from((size.x + 63) & !63) * f64::from(size.y) * f64::from(size.z);
-        let mut places = Vec::new();
-        reserve(&mut places, grid.bricks.len(), WHAT)?;
-        let (mut first, mut size) = box_round(&grid.bricks.places, 0.0, &mut places);
+        let (mut first, mut size) = box_round(&grid.bricks.places, 0.0);
         if volume(size) > most {
             // Without what strays; that is not asked, and hides nothing.
-            (first, size) = box_round(&grid.bricks.places, STRAY, &mut places);
+            (first, size) = box_round(&grid.bricks.places, STRAY);
         }
         let (cubes, mut doublings) = (size, 0);
         while volume(size) > most {
@@ -305,23 +303,39 @@ fn shifted(row: &[u64], dx: i32, to: &mut [u64]) {
 /// The share of bricks at each end of an axis that may stray.
 const STRAY: f64 = 0.005;
 
-/// The first cube, and the size in cubes, of a box round all bricks but a share at each end of each axis; `places` is memory
-/// for as many numbers.
-fn box_round(bricks: &[IVec3], share: f64, places: &mut Vec<i32>) -> (IVec3, IVec3) {
+/// The first cube, and the size in cubes, of a box round all bricks but a share at each end of each axis.
+fn box_round(bricks: &[IVec3], share: f64) -> (IVec3, IVec3) {
     if bricks.is_empty() {
         return (IVec3::ZERO, IVec3::ZERO);
     }
-    let mut low_and_high = |axis: usize| {
-        places.clear();
-        places.extend(bricks.iter().map(|brick| brick[axis]));
-        [share, 1.0 - share].map(|quantile| {
-            let rank = ((bricks.len() - 1) as f64 * quantile).round() as usize;
-            *places.select_nth_unstable(rank).1
-        })
-    };
-    let [x, y, z] = [0, 1, 2].map(&mut low_and_high);
-    let (low, high) = (IVec3::new(x[0], y[0], z[0]), IVec3::new(x[1], y[1], z[1]));
+    let last = (bricks.len() - 1) as f64;
+    let [low, high] = [share, 1.0 - share].map(|quantile| {
+        let rank = (last * quantile).round() as usize;
+        IVec3::from_array([0, 1, 2].map(|axis| ranked(bricks, axis, rank)))
+    });
     (BRICK * low, BRICK * (high - low + 1))
+}
+
+/// The coordinate that would stand at `rank` if those of the bricks were sorted: 31 passes over them at the most, however many
+/// are alike. The library's selection takes the square of their number for such, as the modules have its small one.
+fn ranked(bricks: &[IVec3], axis: usize, rank: usize) -> i32 {
+    let places = || bricks.iter().map(|brick| brick[axis]);
+    let (mut low, mut high) = places().fold((i32::MAX, 0), |(low, high), place| (low.min(place), high.max(place)));
+    if rank == 0 {
+        return low;
+    }
+    if rank + 1 == bricks.len() {
+        return high;
+    }
+    while low < high {
+        let middle = low + (high - low) / 2;
+        if places().filter(|&place| place <= middle).count() > rank {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    low
 }
 
 #[cfg(test)]
@@ -336,6 +350,19 @@ mod tests {
         assert_eq!(evidence[0], AIR * 0.9);
         assert!((-0.03 * AIR..0.0).contains(&evidence[1]), "{evidence:?}");
         assert_eq!(evidence[2], 0.0);
+    }
+
+    #[test]
+    fn ranks_are_those_of_the_sorted_places() {
+        for spread in [1, 2, 7, 1 << 27] {
+            let place = |i: u32| (i.wrapping_mul(0x9E37_79B9) % spread) as i32;
+            let bricks: Vec<IVec3> = (0..100).map(|i| IVec3::new(7, place(i), 0)).collect();
+            let mut sorted: Vec<i32> = (0..100).map(place).collect();
+            sorted.sort_unstable();
+            for rank in [0, 1, 50, 98, 99] {
+                assert_eq!([ranked(&bricks, 0, rank), ranked(&bricks, 1, rank)], [7, sorted[rank]]);
+            }
+        }
     }
 
     #[test]
