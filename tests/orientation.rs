@@ -286,6 +286,24 @@ fn far_bodies_face_outwards() {
     }
 }
 
+/// So few points that several patches of each share its few cubes.
+#[test]
+fn small_bodies_far_apart_face_outwards() {
+    let mut random = Random(36);
+    for each in [100, 200, 400] {
+        let bodies = (0..8).map(|i| {
+            let body = if i % 2 == 0 { sphere(each, i) } else { cube(each, i) };
+            moved(body, [0; 3].map(|_| 1000.0 * random.unit()), 1.0)
+        });
+        let cloud = joined(bodies);
+        for how in [Orient::Consistent, Orient::Outward] {
+            let result = orient(&cloud.points, how);
+            let right = share_right(&result.normals, &cloud.normals);
+            assert!(right > 0.98, "{each}, {how:?}: {right}, {:?}", components(&result));
+        }
+    }
+}
+
 #[test]
 fn noise_flips_next_to_nothing() {
     for (name, cloud, least) in [

@@ -109,12 +109,16 @@ pub(super) fn sights(grid: &Grid, patches: &Patches, points: usize, stage: &Stag
     Ok(sights)
 }
 
-/// Whether in a direction another patch of the cube hides from one what lies beyond: its plane lies there. Else the two sides
-/// of a thin wall would both see what is before each, and the deep side of a blade's edge what is before the other.
+/// Whether in a direction another patch of the cube hides from one what lies beyond: its plane lies there, and the direction
+/// stays on the side of the patch on which the other one lies, so that round a convex edge neither hides anything before the
+/// faces. Else the two sides of a thin wall would both see what is before each, and the deep side of a blade's edge what is
+/// before the other.
 pub(super) fn is_hidden(patch: &Patch, own: &[Patch], direction: IVec3) -> bool {
+    let direction = direction.as_vec3();
     own.iter().any(|other| {
-        let apart = other.normal.dot(other.centre - patch.centre);
-        apart * other.normal.dot(direction.as_vec3()) > 0.0
+        let line = other.centre - patch.centre;
+        let is_there = |normal: Vec3| normal.dot(line) * normal.dot(direction) > 0.0;
+        is_there(other.normal) && is_there(patch.normal)
     })
 }
 
@@ -372,6 +376,24 @@ mod tests {
             for direction in (0..DIRECTIONS).map(direction) {
                 let is_before = if upwards { direction.z >= 0 } else { direction.z <= 0 };
                 assert_eq!(!is_hidden(&wall[number], &wall, direction), is_before, "{number} {direction}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_faces_of_a_convex_edge_hide_nothing_before_them() {
+        let top = patch(Vec3::new(-0.2, 0.0, 0.0), 9);
+        let side = Patch { normal: Vec3::X, ..patch(Vec3::new(0.0, 0.0, -0.2), 9) };
+        for direction in (0..DIRECTIONS).map(direction) {
+            // What the other hides lies beyond it and below the own face.
+            for (own, other, depth, ahead) in
+                [(&top, &side, direction.z, direction.x), (&side, &top, direction.x, direction.z)]
+            {
+                assert_eq!(
+                    is_hidden(own, std::slice::from_ref(other), direction),
+                    depth < 0 && ahead > 0,
+                    "{direction}"
+                );
             }
         }
     }
