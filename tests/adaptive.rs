@@ -163,6 +163,21 @@ fn small_objects_far_apart() {
     }
 }
 
+/// Whatever cubes they share.
+#[test]
+fn a_few_points_of_a_plane_tell_it() {
+    for count in 3..12 {
+        for seed in 0..20 {
+            let (angles, result) = errors(&plane(count, seed, [1.0, -2.0, 3.0]));
+            assert!(
+                worst(&angles) < 0.1,
+                "{count} points, {seed}: {angles:?}, {} unresolved",
+                result.report.unresolved
+            );
+        }
+    }
+}
+
 /// What looks like one thick surface to large neighbourhoods is divided until it is seen what it is.
 #[test]
 fn thin_objects_are_no_noise() {

@@ -141,10 +141,10 @@ impl Window {
     /// The surface that fits the samples best: the plane of the principal components, then by least squares the height
     /// over it as a quadratic function.
     pub fn fit(&self) -> Surface {
-        if self.len() < 3 {
+        let moments = self.moments();
+        if moments[0] < 3.0 {
             return Surface::NONE;
         }
-        let moments = self.moments();
         // Along a line: how many they are, because the halves may tell more.
         self.through(moments).unwrap_or(Surface { points: moments[0] as f32, ..Surface::NONE })
     }
