@@ -26,6 +26,9 @@ const PROBED_POINTS: f64 = 32768.0;
 /// More points than these in the smallest cubes counted, in the mean, are not told apart yet.
 const CROWDED: f64 = 2.0;
 
+/// In single precision nothing is smaller than this share of the cloud, but next to zero.
+const RESOLUTION: f64 = 1.0 / (1 << 24) as f64;
+
 /// Halvings of a probe's edge that 'auto' counts.
 const LEVELS: u32 = 10;
 /// A number for a probe's edge, and for that halved 1 to [`LEVELS`] times.
@@ -84,12 +87,13 @@ impl Density {
             return Ok(Self { middle: bulk.median, count, occupancy: vec![(edge, 0.0)] });
         }
         let (mut occupancy, mut extent): (Vec<(f64, f64)>, f64) = (Vec::new(), extent);
+        let smallest = RESOLUTION * extent;
         loop {
             let probes = Probes::place(&bulk, extent, count);
             let counts = probes.count(points)?;
             let least = counts[LEVELS as usize];
-            if occupancy.last().is_some_and(|&(_, last)| least > 0.5 * last) {
-                // What the halves before could not part are copies of each other.
+            if extent < smallest && occupancy.last().is_some_and(|&(_, last)| least > 0.5 * last) {
+                // What the halves before could not part are copies of each other, and no objects far apart.
                 break;
             }
             let edge_of = |halvings: u32| probes.edge * exp2(-f64::from(halvings));

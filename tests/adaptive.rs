@@ -163,6 +163,19 @@ fn small_objects_far_apart() {
     }
 }
 
+/// Further than cubes reach, and than single precision tells points of one from each other: the larger one, at the origin, is whole.
+#[test]
+fn bodies_a_million_radii_apart() {
+    for (near, far, place) in [(1400, 600, [3e6, 0.0, 0.0]), (1400, 600, [1e8; 3]), (6000, 5000, [1e6; 3])] {
+        let (body, other) = (sphere(near, 23), sphere(far, 24));
+        let points: Vec<f32> =
+            body.points.iter().copied().chain(other.points.iter().enumerate().map(|(i, c)| c + place[i % 3])).collect();
+        let result = run(&points, Cell::Auto);
+        let error = root_mean_square(&angles(&result.normals[..3 * near], &body.normals));
+        assert!(error < 3.0, "{near} and {far}: {error} degrees, {} unresolved", result.report.unresolved);
+    }
+}
+
 /// Whatever cubes they share.
 #[test]
 fn a_few_points_of_a_plane_tell_it() {
