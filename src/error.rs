@@ -58,7 +58,7 @@ impl Error {
     #[inline(never)]
     pub(crate) fn memory(what: &str, needed: u64) -> Self {
         Self::Limit {
-            message: format!("no memory for {what}; use fewer points, or a 64-bit native build"),
+            message: format!("no memory for {what}; use fewer points, or allow more memory"),
             needed,
             available: None,
         }

@@ -50,7 +50,7 @@ pub(crate) fn normals(
     };
     let k = k.min(tree.places.len());
     // What the tasks are going to take is refused here, because they cannot.
-    reserve(&mut Vec::<u8>::new(), parallel::threads() * Search::bytes(k), "the neighbours")?;
+    reserve(&mut Vec::<u8>::new(), parallel::threads().saturating_mul(Search::bytes(k)), "the neighbours")?;
 
     let normals = Normals::new(count, tree.places.len(), curvature, &Frame::GIVEN)?;
     let size = (NEIGHBOURS / k.max(1)).clamp(16, 1024);

@@ -28,13 +28,17 @@ fn aligned(layout: Layout) -> Layout {
 
 fn count(block: *mut u8, bytes: usize) {
     if block.is_null() {
-        // At once: until somebody asks, what failed for want of it has given up its own.
-        let free = (u64::from(MAXIMUM.load(Relaxed)) * PAGE).saturating_sub(USED.load(Relaxed) as u64);
-        // It may lie in pieces.
-        AVAILABLE.store(free.min(bytes as u64 - 1) as usize, Relaxed);
+        // Now: when it is asked for, the call that failed has already freed its memory. And it may lie in pieces.
+        AVAILABLE.store(free().min(bytes as u64 - 1) as usize, Relaxed);
     } else {
         PEAK.fetch_max(USED.fetch_add(bytes, Relaxed) + bytes, Relaxed);
     }
+}
+
+/// What is in no block yet.
+#[inline(never)]
+fn free() -> u64 {
+    (u64::from(MAXIMUM.load(Relaxed)) * PAGE).saturating_sub(USED.load(Relaxed) as u64)
 }
 
 // SAFETY: every call goes to the standard allocator, each block always with the same, possibly stricter, alignment.
@@ -75,6 +79,7 @@ pub fn set_maximum(pages: u32) {
 
 /// What could be had at most instead of the block that was refused last.
 pub(super) fn available(needed: u64) -> u64 {
-    // Nobody asks for a larger one. And less than was needed: of two threads either may have been refused last.
-    if needed > LARGEST_BLOCK { LARGEST_BLOCK } else { (needed - 1).min(AVAILABLE.load(Relaxed) as u64) }
+    // No larger one is asked for, so that none was refused. And less than was needed: of two threads either may have been
+    // refused last.
+    if needed > LARGEST_BLOCK { free().min(LARGEST_BLOCK) } else { (needed - 1).min(AVAILABLE.load(Relaxed) as u64) }
 }

@@ -477,6 +477,16 @@ test('too little memory is a limit error with numbers, and the estimator stays u
   }
 });
 
+test('neighbours that no memory holds are refused beforehand, however many threads ask for them', async (context) => {
+  for (const threads of [16, 64]) {
+    const estimator = await estimatorFor(context, { threads, memoryMaxMiB: 512 });
+    await assert.rejects(estimator.estimateNormals(sphere(2_100_000), { method: 'knn', k: 2 ** 32 - 1 }), (error) => {
+      failing('limit', /neighbours/)(error);
+      return error.needed > 2 ** 29 && error.available <= 2 ** 29;
+    });
+  }
+});
+
 test('dispose ends pending calls and later ones, and nothing else', async () => {
   const estimator = await createEstimator();
   // Many: they must not be done before.
