@@ -44,40 +44,39 @@ export async function load(start: Start, platform: Platform): Promise<Loaded> {
 }
 
 async function loadThreads(threads: number, start: Start, platform: Platform): Promise<Loaded> {
-  const core = () => new URL('./threads/core.wasm', import.meta.url);
-  const full = () => new URL('./threads/full.wasm', import.meta.url);
-  const [glue, module]: [ThreadsGlue, WebAssembly.Module] = await Promise.all([
-    import('./threads/bilinormal.js' as string),
-    compile(start, 'threads', core, full, platform),
-  ]);
-  const [memory, most] = await begin(glue, module, createMemory(start, true));
+  const url = () =>
+    start.full ? new URL('./threads/full.wasm', import.meta.url) : new URL('./threads/core.wasm', import.meta.url);
+  const module = compile(start, 'threads', url, platform);
+  const loaded = await begin<ThreadsGlue>(import('./threads/bilinormal.js' as string), module, start, true);
   pool.start = platform.startThread;
   pool.channel = start.channel;
-  await glue.initThreadPool(threads);
-  return { glue, memory, most, mode: { mode: 'threads', threads } };
+  await loaded.glue.initThreadPool(threads);
+  return { ...loaded, mode: { mode: 'threads', threads } };
 }
 
 async function loadSingle(start: Start, platform: Platform, mode: Mode): Promise<Loaded> {
-  const core = () => new URL('./single/core.wasm', import.meta.url);
-  const full = () => new URL('./single/full.wasm', import.meta.url);
-  const [glue, module]: [Glue, WebAssembly.Module] = await Promise.all([
-    import('./single/bilinormal.js' as string),
-    compile(start, 'single', core, full, platform),
-  ]);
-  const [memory, most] = await begin(glue, module, createMemory(start, false));
-  return { glue, memory, most, mode };
+  const url = () =>
+    start.full ? new URL('./single/full.wasm', import.meta.url) : new URL('./single/core.wasm', import.meta.url);
+  const module = compile(start, 'single', url, platform);
+  return { ...(await begin<Glue>(import('./single/bilinormal.js' as string), module, start, false)), mode };
 }
 
-async function begin(glue: Glue, module: WebAssembly.Module, [memory, pages]: ReturnType<typeof createMemory>) {
-  await glue.default({ module_or_path: module, memory });
+async function begin<G extends Glue>(
+  script: Promise<G>,
+  compiled: Promise<WebAssembly.Module>,
+  start: Start,
+  shared: boolean,
+) {
+  const [glue, module_or_path] = await Promise.all([script, compiled]);
+  const [memory, pages] = createMemory(start, shared);
+  await glue.default({ module_or_path, memory });
   glue.setMaximum(pages);
-  return [memory, pages * 65536] as const;
+  return { glue, memory, most: pages * 65536 };
 }
 
 // Not streamed: that would refuse servers which send .wasm under another media type, for a file this small.
-async function compile(start: Start, build: string, core: () => URL, full: () => URL, { load }: Platform) {
-  const { wasmUrl } = start;
-  const url = wasmUrl ? new URL(`${build}${start.full ? '-full' : ''}.wasm`, wasmUrl) : start.full ? full() : core();
+async function compile({ wasmUrl, full }: Start, build: string, own: () => URL, { load }: Platform) {
+  const url = wasmUrl ? new URL(`${build}${full ? '-full' : ''}.wasm`, wasmUrl) : own();
   try {
     return await WebAssembly.compile(await load(url));
   } catch (error) {

@@ -155,13 +155,19 @@ async function answer(
       return takeFile(glue.writePly(file, put(call.normals), put(call.curvature), call.ascii, tellRest));
     }
     case 'writeCloud': {
-      const { origin, comments, ascii } = call;
-      const [positions, ...parts] = [call.positions, call.normals, call.colors, call.intensity, call.curvature].map(
-        put,
-      );
-      const [normals, colors, intensity, curvature] = parts;
+      const { positions, normals, colors, intensity, curvature, origin, comments, ascii } = call;
       return takeFile(
-        glue.writeCloud(positions!, origin, normals, colors, intensity, curvature, comments, ascii, tell),
+        glue.writeCloud(
+          put(positions),
+          origin,
+          put(normals),
+          put(colors),
+          put(intensity),
+          put(curvature),
+          comments,
+          ascii,
+          tell,
+        ),
       );
     }
   }
