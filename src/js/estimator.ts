@@ -3,7 +3,7 @@ import { buffersOf } from './buffers.js';
 import { BilinormalError } from './error.js';
 import { detect } from './features.js';
 import type { Call, Link, Reply, Start, StartWorker } from './protocol.js';
-import { kindOf, own, resolve, want } from './source.js';
+import { kindOf, own, resolve, want, type Part } from './source.js';
 import type { EstimateOptions, Estimator, EstimatorOptions, ReadOptions } from './types.js';
 
 /** What an estimator needs from where it runs. */
@@ -17,12 +17,16 @@ export interface Host {
 
 interface Job {
   call: Call;
+  /** The call that is meant, where `call` only tries its options. */
+  then: (() => Call) | undefined;
   signal?: AbortSignal;
   tell(phase: string, fraction: number): void;
   resolve(result: any): void;
   reject(error: unknown): void;
   begun: number;
 }
+
+type Prepared = readonly [call: Call, then?: () => Call];
 
 /** Starts an estimator; resolves when its worker is ready. */
 export async function createEstimator(host: Host, options: EstimatorOptions = {}): Promise<Estimator> {
@@ -90,10 +94,12 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
       job.begun = performance.now();
       link ??= start();
       link.hold(true);
-      link.post(job.call, buffersOf(job.call));
+      post(job.call);
       job.tell('start', 0);
     });
   }
+
+  const post = (call: Call) => link!.post(call, buffersOf(call));
 
   /** Does what runs the caller's own function, which may throw, and may stop the running call: then another runs. */
   function attempt(action: (job: Job) => void, job = running!) {
@@ -123,8 +129,12 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
     const receive = (reply: Reply) => {
       answered = true;
       if (mine !== link || !running) return;
-      if ('result' in reply) finish('resolve', reply.result);
-      else if ('phase' in reply) attempt((job) => job.tell(reply.phase, reply.fraction));
+      const { then } = running;
+      if ('result' in reply) {
+        running.then = undefined;
+        if (then) attempt(() => post(then()));
+        else finish('resolve', reply.result);
+      } else if ('phase' in reply) attempt((job) => then || job.tell(reply.phase, reply.fraction));
       else {
         const { code, message, fatal, ...details } = reply.failure;
         if (!code) return fail(message);
@@ -144,7 +154,7 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
   }
 
   /** Queues what `prepare` makes, which copies or takes the arguments before its first wait. */
-  async function run(options: ReadOptions, prepare: (tell: Job['tell']) => Call | Promise<Call>): Promise<any> {
+  async function run(options: ReadOptions, prepare: (tell: Job['tell']) => Prepared | Promise<Prepared>): Promise<any> {
     want(options, 'options', options, 'an object');
     const { signal, onProgress } = options;
     want((onProgress ?? want).call, 'onProgress', onProgress, 'a function');
@@ -165,12 +175,12 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
     let abort!: () => void;
     try {
       if (disposed) throw disposed;
-      const call = await taken(() => prepare(tell));
+      const [call, then] = await taken(() => prepare(tell));
       signal?.throwIfAborted();
       if (disposed) throw disposed;
       let job!: Job;
       const result: any = await new Promise((resolve, reject) => {
-        job = { call, signal, tell, resolve, reject, begun: 0 };
+        job = { call, then, signal, tell, resolve, reject, begun: 0 };
         abort = () => {
           if (running === job) return crash(signal!.reason);
           const at = queue.indexOf(job);
@@ -222,21 +232,28 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
         // By name, for they may be inherited; whatever else there is, the worker refuses.
         const { transfer, signal, onProgress, method, cell, k, orient, curvature, components, ...rest } = options;
         const named = { ...rest, method, cell, k, orient, curvature, components };
-        return {
+        // What waits in the queue must not change, and a proxy of a framework cannot be posted.
+        const plain = JSON.parse(JSON.stringify(named, keepNumbers));
+        const call = (part: Part, take?: boolean): Call => ({
           kind: 'estimate',
-          // What waits in the queue must not change, and a proxy of a framework cannot be posted.
-          options: JSON.parse(JSON.stringify(named, keepNumbers)),
+          options: plain,
           double: kind > 'Float5',
-          positions: own(positions, transfer),
-        };
+          positions: own(part, take),
+        });
+        // A buffer is not taken before the worker has tried the options, without points.
+        return transfer
+          ? [call({ buffer: positions.buffer, byteLength: 0 }), () => call(positions, true)]
+          : [call(positions)];
       }),
 
     readPointCloud: (source, options = {}) =>
-      core.run(options, async (tell) => ({
-        kind: 'read',
-        maxPoints: options.maxPoints && Number(options.maxPoints),
-        file: await resolve(source, host.files, tell, options.signal),
-      })),
+      core.run(options, async (tell) => [
+        {
+          kind: 'read',
+          maxPoints: options.maxPoints && Number(options.maxPoints),
+          file: await resolve(source, host.files, tell, options.signal),
+        },
+      ]),
 
     writePly: (cloud, add, options = {}) =>
       full.run(options, async (tell) => {
@@ -246,20 +263,22 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
         const curvature = pack('curvature', add?.curvature);
         const normals = pack('normals', add?.normals);
         if (!(Object(cloud) === cloud && 'positions' in cloud))
-          return { kind: 'write', normals, curvature, ascii, file: await resolve(cloud, host.files, tell, signal) };
+          return [{ kind: 'write', normals, curvature, ascii, file: await resolve(cloud, host.files, tell, signal) }];
         const comments = [...(cloud.source?.comments ?? [])];
         for (const comment of comments) want(typeof comment === 'string', 'a comment', comment, 'a string');
-        return {
-          kind: 'writeCloud',
-          positions: pack('positions', cloud.positions ?? null)!,
-          origin: Float64Array.from(cloud.origin ?? [0, 0, 0]),
-          normals: normals ?? pack('normals', cloud.normals),
-          colors: pack('colors', cloud.colors, 'Uint8Array'),
-          intensity: pack('intensity', cloud.intensity),
-          curvature,
-          comments,
-          ascii,
-        };
+        return [
+          {
+            kind: 'writeCloud',
+            positions: pack('positions', cloud.positions ?? null)!,
+            origin: Float64Array.from(cloud.origin ?? [0, 0, 0]),
+            normals: normals ?? pack('normals', cloud.normals),
+            colors: pack('colors', cloud.colors, 'Uint8Array'),
+            intensity: pack('intensity', cloud.intensity),
+            curvature,
+            comments,
+            ascii,
+          },
+        ];
       }),
 
     features: async () => detect(),
@@ -270,7 +289,7 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
     },
   };
 
-  return [estimator, () => core.run({}, () => ({ kind: 'hello' }))];
+  return [estimator, () => core.run({}, () => [{ kind: 'hello' }])];
 }
 
 /** JSON has no NaN and no infinity, but an error must say that they came. */

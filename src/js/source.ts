@@ -17,9 +17,12 @@ export function want(well: unknown, name: string, value: any, wanted: string): a
   throw new BilinormalError('input', `${name} is ${came}; wanted ${wanted}`);
 }
 
+/** A buffer, or as much of one as a view has. */
+export type Part = { buffer?: ArrayBufferLike; byteOffset?: number; byteLength: number };
+
 /** The bytes of a buffer or view in a buffer of their own: copied, or taken where `take` is set and all of it came. */
-export function own(from: ArrayBufferLike | ArrayBufferView, take?: boolean): Uint8Array<ArrayBuffer> {
-  const { buffer = from as ArrayBuffer, byteOffset = 0, byteLength } = from as ArrayBufferView;
+export function own(from: Part, take?: boolean): Uint8Array<ArrayBuffer> {
+  const { buffer = from as ArrayBuffer, byteOffset = 0, byteLength } = from;
   try {
     const bytes = new Uint8Array(buffer, byteOffset, byteLength);
     return take &&

@@ -51,8 +51,11 @@ export interface EstimateOptions {
   /** Also return `components`, 4 bytes a point, with `orient: 'consistent'` or `'outward'`. Default false. */
   components?: boolean;
   /**
-   * Default false: the positions are copied when the call is made. True: their buffer is handed over and detached.
-   * A view of a part of a buffer, or of shared memory, is copied all the same: the rest is not the call's to take.
+   * Default false: the positions are copied when the call is made. True: their buffer is handed over and detached, when the
+   * call's turn has come and its options have passed: a call that is refused for its arguments, that is stopped while it waits,
+   * or whose worker does not start leaves it as it was; one that fails or is stopped later does not. Until the call
+   * has ended it must not change. A view of a part of a buffer, or of shared or resizable memory, is copied all the same, then:
+   * the rest is not the call's to take.
    */
   transfer?: boolean;
   /** Hears a fraction that rises from 0 to exactly 1. */

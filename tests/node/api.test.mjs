@@ -303,13 +303,54 @@ test('concurrent calls of one kind queue, and each gets its own result and progr
   );
 });
 
+test('a call that is refused, and one that is given up while it waits, takes no buffer', async (context) => {
+  const estimator = await estimatorFor(context, { threads: 1 });
+  const given = sphere(100);
+  const refused = [
+    [{ methd: 1 }, /methd/],
+    [{ method: 'knn', k: 2 }, /k is 2; wanted/],
+    [{ cell: { scale: 0 } }, /scale is 0; wanted/],
+    [{ components: true }, /components are those of/],
+    [{ orient: 'up' }, /orient is 'up'; wanted/],
+  ];
+  for (const [options, message] of refused) {
+    await assert.rejects(estimator.estimateNormals(given, { ...options, transfer: true }), failing('input', message));
+    assert.equal(given.length, 300, message);
+  }
+  for (const method of ['bilinear', 'knn']) {
+    const control = new AbortController();
+    const before = estimator.estimateNormals(sphere(20000), { method });
+    const waiting = estimator.estimateNormals(given, { method, transfer: true, signal: control.signal });
+    control.abort(new Error('enough'));
+    await assert.rejects(waiting, /enough/);
+    assert.equal((await before).normals.length, 60000);
+    assert.equal(given.length, 300, method);
+  }
+  const told = [];
+  const onProgress = ({ phase, fraction }) => told.push([phase, fraction]);
+  await estimator.estimateNormals(given, { cell: { scale: 1 }, transfer: true, onProgress });
+  assert.equal(given.length, 0);
+  assert.deepEqual(told[1], ['bounds', 0], 'trying the options is no progress');
+});
+
+test('a buffer that goes while its call waits is an input error, and the next call works', async (context) => {
+  const estimator = await estimatorFor(context, { threads: 1 });
+  const given = sphere(100);
+  const calls = [sphere(20000), given, given, sphere(10)].map((positions) =>
+    estimator.estimateNormals(positions, { transfer: true }),
+  );
+  const [, second, third, fourth] = await Promise.allSettled(calls);
+  assert.equal(second.value.normals.length, 300);
+  failing('input', /buffer cannot be taken/)(third.reason);
+  assert.equal(fourth.value.normals.length, 30);
+});
+
 test('transfer takes the buffer; views of parts and shared memory are copied', async () => {
   const expected = (await estimateNormals(sphere(5000))).normals;
 
   const given = sphere(5000);
-  const promise = estimateNormals(given, { transfer: true });
-  assert.equal(given.length, 0, 'detached at once');
-  assert.ok(sameBits((await promise).normals, expected));
+  assert.ok(sameBits((await estimateNormals(given, { transfer: true })).normals, expected));
+  assert.equal(given.length, 0, 'detached');
   await assert.rejects(estimateNormals(given, { transfer: true }), failing('input', /buffer cannot be taken/));
   await assert.rejects(estimateNormals(given), failing('input', /buffer cannot be taken/));
 
@@ -355,9 +396,11 @@ test('points that are not finite get the zero vector', async () => {
 });
 
 test('no points, no normals', async () => {
-  const { normals, report } = await estimateNormals(new Float32Array(0));
-  assert.equal(normals.length, 0);
-  assert.equal(report.points, 0);
+  for (const transfer of [false, true]) {
+    const { normals, report } = await estimateNormals(new Float32Array(0), { transfer });
+    assert.equal(normals.length, 0);
+    assert.equal(report.points, 0);
+  }
 });
 
 /** Half of the points are a ring under the tripod, on the floor z = 0: the library's selection takes minutes for such. */
