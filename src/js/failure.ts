@@ -14,8 +14,8 @@ export const coded = (code: ErrorCode, message: string) => Object.assign(new Err
 
 /** Packs what was thrown, without what is undefined. */
 export function failure(error: unknown): Failure {
-  const { code, message = String(error), line, byte, needed, available } = error as Partial<Failure>;
+  const { code, message = String(error) } = error as Partial<Failure>;
   return /^(format|input|limit|unsupported)$/.test(code!)
-    ? JSON.parse(JSON.stringify({ code, message, line, byte, needed, available }))
+    ? JSON.parse(JSON.stringify(error, ['code', 'message', 'line', 'byte', 'needed', 'available']))
     : { message };
 }

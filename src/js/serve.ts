@@ -13,6 +13,9 @@ const piecesAhead = 4;
 /** What a finite point takes for its place in the grid. */
 const finiteBytes = 16;
 
+/** What is not of floats in a result. */
+const kinds: Record<string, new (buffer: ArrayBufferLike) => object> = { colors: Uint8Array, components: Uint32Array };
+
 /** Returns the receiver of messages. */
 export function serve(post: (reply: Reply, transfer: Transferable[]) => void, platform: Platform) {
   let loaded: Promise<Loaded>;
@@ -74,12 +77,17 @@ async function answer(
     return buffer;
   }
 
-  /** Out of wasm: into new memory, or into bytes of the same length that nobody needs any more. */
-  function take(buffer: Buffer, used?: Uint8Array<ArrayBuffer>): ArrayBuffer {
-    used?.set(view(buffer));
-    const bytes = used ?? view(buffer).slice();
-    buffer.free();
-    return bytes.buffer;
+  /** Puts arrays in place of buffers: in new memory, the normals in bytes of the same length that nobody needs any more. */
+  function takeAll(found: any, used?: Uint8Array): object {
+    for (const name in found) {
+      const buffer = found[name];
+      if (!(buffer instanceof glue.Buffer)) continue;
+      const bytes = name === 'normals' && used;
+      if (bytes) bytes.set(view(buffer));
+      found[name] = new (kinds[name] ?? Float32Array)((bytes || view(buffer).slice()).buffer);
+      buffer.free();
+    }
+    return found;
   }
 
   /** Half of the progress. */
@@ -131,25 +139,12 @@ async function answer(
       const used = call.double ? undefined : call.positions;
       // Not kept meanwhile: 24 bytes a point.
       if (call.double) delete (call as Partial<typeof call>).positions;
-      const { normals, curvature, components, report } = glue.estimate(positions, call.double, call.options, tell);
-      return {
-        normals: new Float32Array(take(normals, used)),
-        ...(curvature && { curvature: new Float32Array(take(curvature)) }),
-        ...(components && { components: new Uint32Array(take(components)) }),
-        report: { ...report, ...mode },
-      };
+      const found = glue.estimate(positions, call.double, call.options, tell);
+      Object.assign(found.report, mode);
+      return takeAll(found, used);
     }
-    case 'read': {
-      const cloud = glue.readPly(await putFile(call.file), call.maxPoints, tellRest);
-      const { positions, normals, colors, intensity } = cloud;
-      return {
-        ...cloud,
-        positions: new Float32Array(take(positions)),
-        ...(normals && { normals: new Float32Array(take(normals)) }),
-        ...(colors && { colors: new Uint8Array(take(colors)) }),
-        ...(intensity && { intensity: new Float32Array(take(intensity)) }),
-      };
-    }
+    case 'read':
+      return takeAll(glue.readPly(await putFile(call.file), call.maxPoints, tellRest));
     case 'write': {
       const file = await putFile(call.file);
       return takeFile(glue.writePly(file, put(call.normals), put(call.curvature), call.ascii, tellRest));
