@@ -1,3 +1,3 @@
-/** The buffers of an object's arrays, to be handed over with it. */
-export const buffersOf = (object: object): ArrayBuffer[] =>
-  Object.values(object).flatMap((value) => (ArrayBuffer.isView(value) ? [value.buffer as ArrayBuffer] : []));
+/** The buffers of a message's arrays, or of those of its result, to be handed over with it. */
+export const buffersOf = (message: any): any[] =>
+  Object.values(message.result ?? message).flatMap((value) => (ArrayBuffer.isView(value) ? [value.buffer] : []));

@@ -1,5 +1,4 @@
 // An estimator: its two workers, and the calls that wait for each.
-import { buffersOf } from './buffers.js';
 import { BilinormalError } from './error.js';
 import { detect } from './features.js';
 import type { Call, Link, Reply, Start, StartWorker } from './protocol.js';
@@ -94,12 +93,10 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
       job.begun = performance.now();
       link ??= start();
       link.hold(true);
-      post(job.call);
+      link.post(job.call);
       job.tell('start', 0);
     });
   }
-
-  const post = (call: Call) => link!.post(call, buffersOf(call));
 
   /** Does what runs the caller's own function, which may throw, and may stop the running call: then another runs. */
   function attempt(action: (job: Job) => void, job = running!) {
@@ -132,7 +129,7 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
       const { then } = running;
       if ('result' in reply) {
         running.then = undefined;
-        if (then) attempt(() => post(then()));
+        if (then) attempt(() => link!.post(then()));
         else finish('resolve', reply.result);
       } else if ('phase' in reply) attempt((job) => then || job.tell(reply.phase, reply.fraction));
       else {

@@ -1,5 +1,8 @@
 // Browser workers as links, wherever the package was loaded from.
+import { buffersOf } from './buffers.js';
 import type { StartWorker } from './protocol.js';
+
+export { buffersOf };
 
 /** How to start a worker: `direct` does it, in the one form that bundlers know and put their own address into. */
 export const starter =
@@ -13,7 +16,7 @@ export const starter =
       fail(event.message || 'it did not load');
     };
     return {
-      post: (message, transfer = []) => worker.postMessage(message, transfer),
+      post: (message) => worker.postMessage(message, buffersOf(message)),
       hold() {},
       end: () => worker.terminate(),
     };

@@ -1,5 +1,6 @@
 // Node's worker threads as links.
 import type { Worker } from 'node:worker_threads';
+import { buffersOf } from './buffers.js';
 import { BilinormalError } from './error.js';
 import type { Link } from './protocol.js';
 
@@ -10,9 +11,9 @@ export function link(worker: Worker, receive: (message: any) => void, fail: (rea
   worker.on('exit', (code) => fail(`exit code ${code}`));
   worker.unref();
   return {
-    post: (message, transfer = []) => {
+    post: (message) => {
       try {
-        worker.postMessage(message, transfer as ArrayBuffer[]);
+        worker.postMessage(message, buffersOf(message));
       } catch (error) {
         // The Blobs that `fs.openAsBlob` makes cannot go to a worker.
         throw new BilinormalError('input', `${(error as Error).message}; wanted its bytes, or the URL of the file`);

@@ -4,7 +4,8 @@ import type { EstimatorOptions, Report } from './types.js';
 
 /** A worker as its owner sees it, in browsers and in Node alike. */
 export interface Link {
-  post(message: unknown, transfer?: Transferable[]): void;
+  /** Hands over the buffers of its arrays. */
+  post(message: object): void;
   /** Whether the process must stay alive for it (Node). */
   hold(pending: boolean): void;
   end(): void;

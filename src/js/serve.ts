@@ -1,5 +1,4 @@
 // The worker's side: takes one call after the other into wasm and hands results out.
-import { buffersOf } from './buffers.js';
 import { coded, failure } from './failure.js';
 import { load, type Loaded, type Platform } from './loader.js';
 import type { Bytes, Call, Reply, Start } from './protocol.js';
@@ -17,10 +16,10 @@ const finiteBytes = 16;
 const kinds: Record<string, new (buffer: ArrayBufferLike) => object> = { colors: Uint8Array, components: Uint32Array };
 
 /** Returns the receiver of messages. */
-export function serve(post: (reply: Reply, transfer: Transferable[]) => void, platform: Platform) {
+export function serve(post: (reply: Reply) => void, platform: Platform) {
   let loaded: Promise<Loaded>;
   let started = false;
-  const tell: Tell = (phase, fraction) => post({ phase, fraction }, []);
+  const tell: Tell = (phase, fraction) => post({ phase, fraction });
   return async (message: Start | Call) => {
     if (message.kind === 'start') {
       loaded = load(message, platform);
@@ -31,14 +30,13 @@ export function serve(post: (reply: Reply, transfer: Transferable[]) => void, pl
     try {
       const wasm = await loaded;
       started = true;
-      const result = await answer(message, wasm, platform, tell);
-      post({ result }, buffersOf(result));
+      post({ result: await answer(message, wasm, platform, tell) });
     } catch (error) {
       const packed = failure(error);
       // What fails before anything runs is a script or a module that did not load.
       if (!started) packed.code ??= 'unsupported';
       // After a limit a new worker begins with empty memory; wasm memory never shrinks.
-      post({ failure: { ...packed, fatal: !started || packed.code === 'limit' } }, []);
+      post({ failure: { ...packed, fatal: !started || packed.code === 'limit' } });
     }
   };
 }

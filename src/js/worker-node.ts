@@ -4,12 +4,13 @@ import { readFile } from 'node:fs/promises';
 import { availableParallelism } from 'node:os';
 import { fileURLToPath } from 'node:url';
 import { Worker, parentPort } from 'node:worker_threads';
+import { buffersOf } from './buffers.js';
 import { link } from './node-link.js';
 import { serve } from './serve.js';
 
 const port = parentPort!;
 
-const receive = serve((reply, transfer) => port.postMessage(reply, transfer as ArrayBuffer[]), {
+const receive = serve((reply) => port.postMessage(reply, buffersOf(reply)), {
   processors: availableParallelism(),
   startThread: (receive, fail) =>
     link(new Worker(new URL('./thread-node.js', import.meta.url), { execArgv: [] }), receive, fail),

@@ -1,8 +1,8 @@
 // The worker, in a browser.
-import { starter } from './link.js';
+import { buffersOf, starter } from './link.js';
 import { serve } from './serve.js';
 
-const receive = serve((reply, transfer) => postMessage(reply, { transfer }), {
+const receive = serve((reply) => postMessage(reply, { transfer: buffersOf(reply) }), {
   processors: navigator.hardwareConcurrency,
   startThread: starter(() => new Worker(new URL('./thread.js', import.meta.url), { type: 'module' })),
   async load(url) {
