@@ -58,6 +58,8 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
   let running: Job | undefined;
   let link: Link | undefined;
   let channel: BroadcastChannel;
+  /** One for each call that has not ended. */
+  const open = new Set<AbortController>();
   let disposed: BilinormalError | undefined;
 
   function endWorker() {
@@ -81,7 +83,7 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
   }
 
   function next() {
-    if (running) return;
+    if (running || disposed) return;
     running = queue.shift();
     // One signal may have stopped many calls.
     while (running?.signal?.aborted) {
@@ -151,7 +153,10 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
   }
 
   /** Queues what `prepare` makes, which copies or takes the arguments before its first wait. */
-  async function run(options: ReadOptions, prepare: (tell: Job['tell']) => Prepared | Promise<Prepared>): Promise<any> {
+  async function run(
+    options: ReadOptions,
+    prepare: (tell: Job['tell'], stop: AbortSignal) => Prepared | Promise<Prepared>,
+  ): Promise<any> {
     want(options, 'options', options, 'an object');
     const { signal, onProgress } = options;
     want((onProgress ?? want).call, 'onProgress', onProgress, 'a function');
@@ -169,23 +174,24 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
         throw error;
       }
     };
-    let abort!: () => void;
+    const control = new AbortController();
+    const stop = control.signal;
+    open.add(control);
+    signal?.addEventListener('abort', () => control.abort(signal.reason), { signal: stop });
     try {
       if (disposed) throw disposed;
-      const [call, then] = await taken(() => prepare(tell));
-      signal?.throwIfAborted();
-      if (disposed) throw disposed;
+      const [call, then] = await taken(() => prepare(tell, stop));
+      stop.throwIfAborted();
       let job!: Job;
       const result: any = await new Promise((resolve, reject) => {
         job = { call, then, signal, tell, resolve, reject, begun: 0 };
-        abort = () => {
-          if (running === job) return crash(signal!.reason);
+        stop.addEventListener('abort', () => {
+          if (running === job) return crash(stop.reason);
           const at = queue.indexOf(job);
           // Elsewhere: it is settled.
           if (at >= 0) queue.splice(at, 1);
-          reject(signal!.reason);
-        };
-        signal?.addEventListener('abort', abort);
+          reject(stop.reason);
+        });
         queue.push(job);
         next();
       });
@@ -193,16 +199,18 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
       tell('done', 1);
       return result;
     } catch (error) {
-      throw signal?.aborted ? signal.reason : thrown ? thrown[0] : error;
+      throw stop.aborted ? stop.reason : thrown ? thrown[0] : error;
     } finally {
-      signal?.removeEventListener('abort', abort);
+      open.delete(control);
+      // Nobody listens any more.
+      control.abort();
     }
   }
 
   function dispose() {
     disposed = new BilinormalError('input', 'the estimator was disposed');
-    for (const job of queue.splice(0)) job.reject(disposed);
-    crash(disposed);
+    for (const control of open) control.abort(disposed);
+    endWorker();
   }
 
   return { run, dispose };
@@ -244,23 +252,23 @@ export function openEstimator(host: Host, options: EstimatorOptions): [Estimator
       }),
 
     readPointCloud: (source, options = {}) =>
-      core.run(options, async (tell) => [
+      core.run(options, async (tell, stop) => [
         {
           kind: 'read',
           maxPoints: options.maxPoints && Number(options.maxPoints),
-          file: await resolve(source, host.files, tell, options.signal),
+          file: await resolve(source, host.files, tell, stop),
         },
       ]),
 
     writePly: (cloud, add, options = {}) =>
-      full.run(options, async (tell) => {
-        const { format = 'binary_little_endian', signal } = options;
+      full.run(options, async (tell, stop) => {
+        const { format = 'binary_little_endian' } = options;
         const ascii = format === 'ascii';
         want(ascii || format === 'binary_little_endian', 'format', format, `'binary_little_endian' or 'ascii'`);
         const curvature = pack('curvature', add?.curvature);
         const normals = pack('normals', add?.normals);
         if (!(Object(cloud) === cloud && 'positions' in cloud))
-          return [{ kind: 'write', normals, curvature, ascii, file: await resolve(cloud, host.files, tell, signal) }];
+          return [{ kind: 'write', normals, curvature, ascii, file: await resolve(cloud, host.files, tell, stop) }];
         const comments = [...(cloud.source?.comments ?? [])];
         for (const comment of comments) want(typeof comment === 'string', 'a comment', comment, 'a string');
         return [

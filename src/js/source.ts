@@ -45,7 +45,7 @@ export async function resolve(
   source: any,
   files: boolean,
   tell: (phase: string, fraction: number) => void,
-  signal?: AbortSignal,
+  signal: AbortSignal,
 ): Promise<Bytes> {
   const kind = kindOf(source);
   if (/^(Blob|File)$/.test(kind)) return source;
@@ -55,7 +55,7 @@ export async function resolve(
     if (files && source.protocol === 'file:') return source.href;
     tell('download', 0);
     try {
-      response = await fetch(source, { signal: signal! });
+      response = await fetch(source, { signal });
     } catch (error: any) {
       throw new BilinormalError('input', `${source} did not load: ${error.cause?.message ?? error.message}`);
     }
@@ -79,7 +79,7 @@ export async function resolve(
       controller.enqueue(piece);
     },
   });
-  return new Response(body?.pipeThrough(count, { signal: signal! })).blob().catch((error) => {
+  return new Response(body?.pipeThrough(count, { signal })).blob().catch((error) => {
     throw error instanceof TypeError ? new BilinormalError('input', `${url} broke off: ${error.message}`) : error;
   });
 }

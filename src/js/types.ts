@@ -216,6 +216,6 @@ export interface Estimator {
   readPointCloud(source: Source, options?: ReadOptions): Promise<PointCloud>;
   writePly(cloud: PointCloud<Float32Array, Uint8Array> | Source, add: Additions, options?: WriteOptions): Promise<Blob>;
   features(): Promise<Features>;
-  /** Ends the workers and their threads; calls that wait or run, and later ones, reject; of downloads, when they have ended. */
+  /** Ends the workers, their threads and downloads; calls that wait or run, and later ones, reject (`input`). */
   dispose(): void;
 }

@@ -545,6 +545,25 @@ test('dispose ends pending calls and later ones, and nothing else', async () => 
   assert.equal((await shared).normals.length, 300);
 });
 
+test('dispose ends downloads that stall: of a URL, before and after its answer begins, and of a Response', async () => {
+  const server = createServer((request, response) => {
+    if (request.url === '/begins') response.write('ply\n');
+  });
+  await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
+  after(() => server.close());
+  after(() => server.closeAllConnections());
+  const address = new URL(`http://127.0.0.1:${server.address().port}/`);
+  const estimator = await createEstimator({ threads: 1 });
+  const begins = new URL('begins', address);
+  const pending = [address, begins, await fetch(begins), new Response(new ReadableStream())].flatMap((source, i) => [
+    estimator.readPointCloud(source),
+    ...(i < 2 ? [estimator.writePly(source, {})] : []),
+  ]);
+  await new Promise((resolve) => setTimeout(resolve, 50));
+  estimator.dispose();
+  for (const call of pending) await assert.rejects(call, failing('input', /disposed/));
+});
+
 const typed = `ply
 format ascii 1.0
 comment made by hand
