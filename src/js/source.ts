@@ -50,24 +50,20 @@ export async function resolve(
   const kind = kindOf(source);
   if (/^(Blob|File)$/.test(kind)) return source;
   if (/^(Uint8Array|(Shared)?ArrayBuffer)$/.test(kind)) return own(source);
+  const fail = (what: string): never => {
+    throw new BilinormalError('input', `${kind === 'URL' ? source : source.url || 'the Response'} ${what}`);
+  };
+  const broken = (what: string) => (error: any) => fail(`${what}: ${error?.cause?.message ?? error?.message ?? error}`);
   let response: Response = source;
   if (kind === 'URL') {
     if (files && source.protocol === 'file:') return source.href;
     tell('download', 0);
-    try {
-      response = await fetch(source, { signal });
-    } catch (error: any) {
-      throw new BilinormalError('input', `${source} did not load: ${error.cause?.message ?? error.message}`);
-    }
+    response = await fetch(source, { signal }).catch(broken('did not load'));
   } else want(kind === 'Response', 'the source', source, 'a File, Blob, ArrayBuffer, Uint8Array, URL or Response');
 
-  const { ok, status, url, body, bodyUsed, headers } = response;
-  if (!ok || bodyUsed) {
-    throw new BilinormalError(
-      'input',
-      `${url || 'the Response'} ${ok ? 'was read before' : `has HTTP status ${status}`}`,
-    );
-  }
+  const { ok, status, body, bodyUsed, headers } = response;
+  if (!ok) fail(`has HTTP status ${status}`);
+  if (bodyUsed) fail('was read before');
   const total = Number(headers.get('content-length'));
   let loaded = 0;
   // Counted on its way into a Blob, which the browser keeps where it likes.
@@ -79,7 +75,5 @@ export async function resolve(
       controller.enqueue(piece);
     },
   });
-  return new Response(body?.pipeThrough(count, { signal })).blob().catch((error) => {
-    throw error instanceof TypeError ? new BilinormalError('input', `${url} broke off: ${error.message}`) : error;
-  });
+  return new Response(body?.pipeThrough(count, { signal })).blob().catch(broken('broke off'));
 }

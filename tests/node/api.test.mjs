@@ -664,6 +664,23 @@ test('a download tells its progress, and can be aborted', async () => {
   }
 });
 
+test('a body that breaks off is an input error that names it', async () => {
+  const broken = (error) => new Response(new ReadableStream({ start: (body) => body.error(error) }));
+  for (const error of [new Error('the disk is gone'), new TypeError('the disk is gone'), 'the disk is gone']) {
+    await assert.rejects(readPointCloud(broken(error)), failing('input', /^the Response broke off: the disk is gone$/));
+  }
+  const server = createServer((_, response) => {
+    response.setHeader('content-length', 9);
+    response.write('ply', () => response.destroy());
+  });
+  await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
+  after(() => server.close());
+  const address = new URL(`http://127.0.0.1:${server.address().port}/scan.ply`);
+  for (const source of [address, await fetch(address)]) {
+    await assert.rejects(readPointCloud(source), failing('input', /scan\.ply broke off: ./));
+  }
+});
+
 test('a file tells where the scanner stood', async () => {
   const place = ['view_px', 'view_py', 'view_pz'].map((name) => `property double ${name}\n`).join('');
   const axes = ['x', 'y', 'z'].map((name) => `property double ${name}\n`).join('');
