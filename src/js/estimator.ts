@@ -30,26 +30,20 @@ type Prepared = readonly [call: Call, then?: () => Call];
 /** Starts an estimator; resolves when its worker is ready. */
 export async function createEstimator(host: Host, options: EstimatorOptions = {}): Promise<Estimator> {
   want(options, 'options', options, 'an object');
-  const { threads = 'auto', memoryMaxMiB = 4096 } = options;
+  const { threads = 'auto', memoryMaxMiB = 4096, wasmUrl } = options;
   const isWhole = (value: number, from: number, to: number) => Number.isInteger(value) && from <= value && value <= to;
   want(threads === 'auto' || isWhole(threads, 1, 256), 'threads', threads, `'auto' or 1 to 256`);
   want(isWhole(memoryMaxMiB, 16, 4096), 'memoryMaxMiB', memoryMaxMiB, '16 to 4096');
-  // With a slash at its end, for it names a folder.
-  const wasmUrl = await taken(
-    () => options.wasmUrl && new URL(`${options.wasmUrl}`.replace(/\/*$/, '/'), host.base()).href,
-  );
-  const [estimator, ready] = openEstimator(host, { threads, memoryMaxMiB, wasmUrl });
+  let folder: string | undefined;
+  try {
+    if (/^(String|URL)$/.test(kindOf(wasmUrl))) folder = new URL(wasmUrl!, host.base()).href;
+  } catch {
+    // Told with the others.
+  }
+  want(folder || !wasmUrl, 'wasmUrl', wasmUrl, 'a string or URL that is an address');
+  const [estimator, ready] = openEstimator(host, { threads, memoryMaxMiB, wasmUrl: folder });
   await ready();
   return estimator;
-}
-
-/** What comes of arguments; what JavaScript itself finds wrong with their kinds is an `input` error. */
-async function taken<T>(take: () => T | Promise<T>): Promise<T> {
-  try {
-    return await take();
-  } catch (error) {
-    throw error instanceof TypeError ? new BilinormalError('input', error.message) : error;
-  }
 }
 
 /** Calls that wait for one worker, which starts with the first of them. */
@@ -180,7 +174,7 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
     signal?.addEventListener('abort', () => control.abort(signal.reason), { signal: stop });
     try {
       if (disposed) throw disposed;
-      const [call, then] = await taken(() => prepare(tell, stop));
+      const [call, then] = await prepare(tell, stop);
       stop.throwIfAborted();
       let job!: Job;
       const result: any = await new Promise((resolve, reject) => {
@@ -199,7 +193,10 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
       tell('done', 1);
       return result;
     } catch (error) {
-      throw stop.aborted ? stop.reason : thrown ? thrown[0] : error;
+      if (stop.aborted) throw stop.reason;
+      if (thrown) throw thrown[0];
+      // What JavaScript itself finds wrong with arguments.
+      throw error instanceof TypeError ? new BilinormalError('input', error.message) : error;
     } finally {
       open.delete(control);
       // Nobody listens any more.
@@ -222,7 +219,10 @@ function isPlain({ method = 'bilinear', cell = 'auto', orient = 'none', k, curva
 }
 
 /** An estimator that starts a worker when a call needs one, and a call that does no more than that. */
-export function openEstimator(host: Host, options: EstimatorOptions): [Estimator, () => Promise<unknown>] {
+export function openEstimator(
+  host: Host,
+  options: EstimatorOptions & { wasmUrl?: string },
+): [Estimator, () => Promise<unknown>] {
   const core = openQueue(host, options);
   // What few callers need has a worker of its own, so that the other one keeps its module, which engines make faster
   // while it runs.

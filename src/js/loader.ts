@@ -76,7 +76,8 @@ async function begin<G extends Glue>(
 
 // Not streamed: that would refuse servers which send .wasm under another media type, for a file this small.
 async function compile({ wasmUrl, full }: Start, build: string, own: () => URL, { load }: Platform) {
-  const url = wasmUrl ? new URL(`${build}${full ? '-full' : ''}.wasm`, wasmUrl) : own();
+  // A query stays: it may be a version, or a permit.
+  const url = wasmUrl ? new URL(wasmUrl.replace(/\/*([?#]|$)/, `/${build}${full ? '-full' : ''}.wasm$1`)) : own();
   try {
     return await WebAssembly.compile(await load(url));
   } catch (error) {

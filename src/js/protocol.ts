@@ -19,6 +19,7 @@ export type Bytes = Blob | Uint8Array | string;
 
 export interface Start extends EstimatorOptions {
   kind: 'start';
+  wasmUrl?: string;
   /** Name of the BroadcastChannel on which a thread tells its death: the worker that owns it cannot, it waits for it. */
   channel: string;
   /** Whether to load the module with what few callers need: all but reading, and estimating with the default options. */

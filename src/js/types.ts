@@ -191,7 +191,7 @@ export interface EstimatorOptions {
   /**
    * A folder that holds `single.wasm` and `threads.wasm`, and for all but reading and the default options also
    * `single-full.wasm` and `threads-full.wasm` (this package exports them under these names), for those who host them
-   * themselves. A relative address counts from the page; in Node, from the working directory.
+   * themselves. A relative address counts from the page; in Node, from the working directory. A query goes to each file.
    */
   wasmUrl?: string | URL;
   /** Most memory that either wasm module may take, 16 to 4096. Default 4096, or the most that the engine grants. */

@@ -1,6 +1,6 @@
 // What API.md promises, on the packed package in Node.
 import assert from 'node:assert/strict';
-import { openAsBlob, writeFileSync } from 'node:fs';
+import { openAsBlob, readFileSync, writeFileSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { availableParallelism } from 'node:os';
 import { join } from 'node:path';
@@ -462,7 +462,9 @@ test('wrong arguments are input errors that say what came and what was wanted', 
     [() => createEstimator({ memoryMaxMiB: 5000 }), /memoryMaxMiB is 5000; wanted 16 to 4096/],
     [() => createEstimator(null), /options is null; wanted an object/],
     // What JavaScript itself finds wrong.
-    [() => createEstimator({ wasmUrl: 'http://[' }), /Invalid URL/],
+    [() => createEstimator({ wasmUrl: 'http://[' }), /wasmUrl is 'http:\/\/\['; wanted a string or URL/],
+    [() => createEstimator({ wasmUrl: 5 }), /wasmUrl is 5; wanted a string or URL/],
+    [() => createEstimator({ wasmUrl: {} }), /wasmUrl is Object\(\); wanted a string or URL/],
     [() => estimateNormals(positions, { k: 5n }), /BigInt/],
     [() => readPointCloud(locked), /locked/],
     [() => readPointCloud(blobOfFile), /wanted its bytes, or the URL of the file/],
@@ -737,6 +739,25 @@ test('a cloud written and read again is the same cloud', async () => {
   const absolute = ({ positions, origin }) => [...positions].map((value, i) => value + origin[i % 3]);
   assert.deepEqual(absolute(again), absolute(cloud));
   for (const part of ['normals', 'colors', 'intensity']) assert.deepEqual(again[part], cloud[part], part);
+});
+
+test('a query of wasmUrl is that of each of its files', async (context) => {
+  const asked = [];
+  const server = createServer((request, response) => {
+    asked.push(request.url);
+    const build = /(single|threads)\.wasm/.exec(request.url)[1];
+    response.end(readFileSync(join(home, 'dist', build, 'core.wasm')));
+  });
+  await new Promise((resolve) => server.listen(0, '127.0.0.1', resolve));
+  after(() => server.close());
+  const address = `http://127.0.0.1:${server.address().port}`;
+  for (const [threads, path] of [
+    [1, '/x?v=1/'],
+    [2, '/x/?v=1#part'],
+  ]) {
+    await estimatorFor(context, { threads, wasmUrl: address + path });
+  }
+  assert.deepEqual(asked, ['/x/single.wasm?v=1/', '/x/threads.wasm?v=1']);
 });
 
 test('an estimator finds wasm files that are hosted elsewhere', async (context) => {
