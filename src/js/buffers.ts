@@ -1,3 +1,3 @@
-/** The buffers of a message's arrays, or of those of its result, to be handed over with it. */
-export const buffersOf = (message: any): any[] =>
-  Object.values(message.result ?? message).flatMap((value) => (ArrayBuffer.isView(value) ? [value.buffer] : []));
+/** The buffers of the arrays in a message's data, to be handed over with it. */
+export const buffersOf = ({ data = {} }: any): any[] =>
+  Object.values(data).flatMap((value) => (ArrayBuffer.isView(value) ? [value.buffer] : []));

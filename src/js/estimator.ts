@@ -123,10 +123,10 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
       answered = true;
       if (mine !== link || !running) return;
       const { then } = running;
-      if ('result' in reply) {
+      if ('data' in reply) {
         running.then = undefined;
         if (then) attempt(() => link!.post(then()));
-        else finish('resolve', reply.result);
+        else finish('resolve', reply.data);
       } else if ('phase' in reply) attempt((job) => then || job.tell(reply.phase, reply.fraction));
       else {
         const { code, message, fatal, ...details } = reply.failure;
@@ -241,9 +241,7 @@ export function openEstimator(
         const plain = JSON.parse(JSON.stringify(named, keepNumbers));
         const call = (part: Part, take?: boolean): Call => ({
           kind: 'estimate',
-          options: plain,
-          double: kind > 'Float5',
-          positions: own(part, take),
+          data: [own(part, take), kind > 'Float5', plain],
         });
         // A buffer is not taken before the worker has tried the options, without points.
         return transfer
@@ -252,13 +250,10 @@ export function openEstimator(
       }),
 
     readPointCloud: (source, options = {}) =>
-      core.run(options, async (tell, stop) => [
-        {
-          kind: 'read',
-          maxPoints: options.maxPoints && Number(options.maxPoints),
-          file: await resolve(source, host.files, tell, stop),
-        },
-      ]),
+      core.run(options, async (tell, stop) => {
+        const maxPoints = options.maxPoints && Number(options.maxPoints);
+        return [{ kind: 'readPly', data: [await resolve(source, host.files, tell, stop), maxPoints] }];
+      }),
 
     writePly: (cloud, add, options = {}) =>
       full.run(options, async (tell, stop) => {
@@ -268,20 +263,24 @@ export function openEstimator(
         const curvature = pack('curvature', add?.curvature);
         const normals = pack('normals', add?.normals);
         if (!(Object(cloud) === cloud && 'positions' in cloud))
-          return [{ kind: 'write', normals, curvature, ascii, file: await resolve(cloud, host.files, tell, stop) }];
+          return [
+            { kind: 'writePly', data: [await resolve(cloud, host.files, tell, stop), normals, curvature, ascii] },
+          ];
         const comments = [...(cloud.source?.comments ?? [])];
         for (const comment of comments) want(typeof comment === 'string', 'a comment', comment, 'a string');
         return [
           {
             kind: 'writeCloud',
-            positions: pack('positions', cloud.positions ?? null)!,
-            origin: Float64Array.from(cloud.origin ?? [0, 0, 0]),
-            normals: normals ?? pack('normals', cloud.normals),
-            colors: pack('colors', cloud.colors, 'Uint8Array'),
-            intensity: pack('intensity', cloud.intensity),
-            curvature,
-            comments,
-            ascii,
+            data: [
+              pack('positions', cloud.positions ?? null)!,
+              Float64Array.from(cloud.origin ?? [0, 0, 0]),
+              normals ?? pack('normals', cloud.normals),
+              pack('colors', cloud.colors, 'Uint8Array'),
+              pack('intensity', cloud.intensity),
+              curvature,
+              comments,
+              ascii,
+            ],
           },
         ];
       }),
@@ -294,7 +293,7 @@ export function openEstimator(
     },
   };
 
-  return [estimator, () => core.run({}, () => [{ kind: 'hello' }])];
+  return [estimator, () => core.run({}, () => [{ kind: 'hello', data: [] }])];
 }
 
 /** JSON has no NaN and no infinity, but an error must say that they came. */

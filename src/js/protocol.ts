@@ -28,24 +28,29 @@ export interface Start extends EstimatorOptions {
   reason?: string;
 }
 
+/** A function of the wasm module and what it is called with, arrays as their bytes; `hello` is none. */
 export type Call =
-  | { kind: 'hello' }
-  | { kind: 'estimate'; positions: Uint8Array<ArrayBuffer>; double: boolean; options: { orient?: any } }
-  | { kind: 'read'; file: Bytes; maxPoints?: number }
-  | { kind: 'write'; file: Bytes; normals?: Uint8Array; curvature?: Uint8Array; ascii: boolean }
+  | { kind: 'hello'; data: [] }
+  | { kind: 'estimate'; data: [positions: Uint8Array<ArrayBuffer>, double: boolean, options: { orient?: any }] }
+  | { kind: 'readPly'; data: [file: Bytes, maxPoints: number | undefined] }
+  | { kind: 'writePly'; data: [file: Bytes, normals: Part, curvature: Part, ascii: boolean] }
   | {
       kind: 'writeCloud';
-      positions: Uint8Array;
-      origin: Float64Array;
-      normals?: Uint8Array;
-      colors?: Uint8Array;
-      intensity?: Uint8Array;
-      curvature?: Uint8Array;
-      comments: string[];
-      ascii: boolean;
+      data: [
+        positions: Uint8Array,
+        origin: Float64Array,
+        normals: Part,
+        colors: Part,
+        intensity: Part,
+        curvature: Part,
+        comments: string[],
+        ascii: boolean,
+      ];
     };
 
-export type Reply = { phase: string; fraction: number } | { failure: Failure } | { result: any };
+type Part = Uint8Array | undefined;
+
+export type Reply = { phase: string; fraction: number } | { failure: Failure } | { data: any };
 
 /** Which build runs, as it enters the report. */
 export type Mode = Pick<Report, 'mode' | 'threads' | 'fallbackReason'>;

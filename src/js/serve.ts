@@ -1,7 +1,7 @@
 // The worker's side: takes one call after the other into wasm and hands results out.
 import { coded, failure } from './failure.js';
 import { load, type Loaded, type Platform } from './loader.js';
-import type { Bytes, Call, Reply, Start } from './protocol.js';
+import type { Call, Reply, Start } from './protocol.js';
 import type { Buffer, Tell } from './wasm.js';
 
 /** Blobs are read in pieces of this size, so that a file is never whole in JavaScript memory. */
@@ -30,7 +30,7 @@ export function serve(post: (reply: Reply) => void, platform: Platform) {
     try {
       const wasm = await loaded;
       started = true;
-      post({ result: await answer(message, wasm, platform, tell) });
+      post({ data: await answer(message, wasm, platform, tell) });
     } catch (error) {
       const packed = failure(error);
       // What fails before anything runs is a script or a module that did not load.
@@ -42,7 +42,7 @@ export function serve(post: (reply: Reply) => void, platform: Platform) {
 }
 
 /** Throws a `limit` error if the points of a call cannot fit, however they lie: at once, before wasm gets them. */
-function refuse({ positions: { buffer }, double, options }: Extract<Call, { kind: 'estimate' }>, most: number) {
+function refuse([{ buffer }, double, options]: Extract<Call, { kind: 'estimate' }>['data'], most: number) {
   const { orient = 'none' } = options;
   // Any point's normal takes the place of its position, unless the sign needs that.
   const anyBytes = orient === 'none' || orient?.up ? 12 : 24;
@@ -60,40 +60,29 @@ function refuse({ positions: { buffer }, double, options }: Extract<Call, { kind
 }
 
 async function answer(
-  call: Call,
+  { kind, data }: Call,
   { glue, memory, most, mode }: Loaded,
   platform: Platform,
   tell: Tell,
 ): Promise<object> {
+  if (kind === 'hello') return mode;
+
   // Made anew for each use: a view of memory that has grown since is empty.
   const view = ({ pointer, byteLength }: Buffer) => new Uint8Array(memory.buffer, pointer, byteLength);
+  let hear = tell;
 
-  function put<T extends Uint8Array | undefined>(bytes: T): Buffer | (T & undefined) {
-    if (!bytes) return bytes as T & undefined;
-    const buffer = new glue.Buffer(bytes.byteLength);
-    view(buffer).set(bytes);
-    return buffer;
-  }
-
-  /** Puts arrays in place of buffers: in new memory, the normals in bytes of the same length that nobody needs any more. */
-  function takeAll(found: any, used?: Uint8Array): object {
-    for (const name in found) {
-      const buffer = found[name];
-      if (!(buffer instanceof glue.Buffer)) continue;
-      const bytes = name === 'normals' && used;
-      if (bytes) bytes.set(view(buffer));
-      found[name] = new (kinds[name] ?? Float32Array)((bytes || view(buffer).slice()).buffer);
-      buffer.free();
-    }
-    return found;
-  }
-
-  /** Half of the progress. */
-  async function putFile(file: Bytes): Promise<Buffer> {
-    if (file instanceof Uint8Array) return put(file);
+  /** Bytes as a buffer of wasm, also those of a file, which take half of the progress; all else as it is. */
+  async function put(part: unknown): Promise<unknown> {
     let buffer: Buffer | undefined;
+    if (part instanceof Uint8Array) {
+      buffer = new glue.Buffer(part.byteLength);
+      view(buffer).set(part);
+      return buffer;
+    }
+    if (typeof part !== 'string' && !(part instanceof Blob)) return part;
+    hear = (phase, fraction) => tell(phase, (1 + fraction) / 2);
     try {
-      const blob = typeof file === 'string' ? platform.open!(file) : file;
+      const blob = typeof part === 'string' ? platform.open!(part) : part;
       buffer = new glue.Buffer(blob.size);
       const ahead: Promise<ArrayBuffer>[] = [];
       for (let at = 0, next = 0; at < blob.size; at += pieceBytes) {
@@ -115,53 +104,35 @@ async function answer(
     }
   }
 
-  /** Out of wasm in pieces, so that the file is never twice in memory. */
-  function takeFile(buffer: Buffer): Blob {
-    const parts: BlobPart[] = [];
-    for (let at = 0; at < buffer.byteLength; at += pieceBytes) {
-      parts.push(new Blob([view(buffer).slice(at, at + pieceBytes)]));
+  let used: Uint8Array | undefined;
+  if (kind === 'estimate') {
+    refuse(data, most);
+    // The normals need just as much, and memory that is new to the system takes several times as long to write to.
+    if (!data[1]) used = data[0];
+  }
+  const parts: unknown[] = [];
+  // Not kept meanwhile: doubles are 24 bytes a point.
+  while (data.length > 0) parts.push(await put(data.shift()));
+  const found: any = (glue[kind] as any)(...parts, hear);
+
+  if (found instanceof glue.Buffer) {
+    // A file: out of wasm in pieces, so that it is never twice in memory.
+    const pieces: BlobPart[] = [];
+    for (let at = 0; at < found.byteLength; at += pieceBytes) {
+      pieces.push(new Blob([view(found).slice(at, at + pieceBytes)]));
     }
+    found.free();
+    return new Blob(pieces, { type: 'application/octet-stream' });
+  }
+  if (found.report) Object.assign(found.report, mode);
+  // Arrays in place of buffers: in new memory, the normals in bytes of the same length that nobody needs any more.
+  for (const name in found) {
+    const buffer = found[name];
+    if (!(buffer instanceof glue.Buffer)) continue;
+    const bytes = name === 'normals' && used;
+    if (bytes) bytes.set(view(buffer));
+    found[name] = new (kinds[name] ?? Float32Array)((bytes || view(buffer).slice()).buffer);
     buffer.free();
-    return new Blob(parts, { type: 'application/octet-stream' });
   }
-
-  const tellRest: Tell = (phase, fraction) => tell(phase, (1 + fraction) / 2);
-
-  switch (call.kind) {
-    case 'hello':
-      return mode;
-    case 'estimate': {
-      refuse(call, most);
-      const positions = put(call.positions);
-      // The normals need just as much, and memory that is new to the system takes several times as long to write to.
-      const used = call.double ? undefined : call.positions;
-      // Not kept meanwhile: 24 bytes a point.
-      if (call.double) delete (call as Partial<typeof call>).positions;
-      const found = glue.estimate(positions, call.double, call.options, tell);
-      Object.assign(found.report, mode);
-      return takeAll(found, used);
-    }
-    case 'read':
-      return takeAll(glue.readPly(await putFile(call.file), call.maxPoints, tellRest));
-    case 'write': {
-      const file = await putFile(call.file);
-      return takeFile(glue.writePly(file, put(call.normals), put(call.curvature), call.ascii, tellRest));
-    }
-    case 'writeCloud': {
-      const { positions, normals, colors, intensity, curvature, origin, comments, ascii } = call;
-      return takeFile(
-        glue.writeCloud(
-          put(positions),
-          origin,
-          put(normals),
-          put(colors),
-          put(intensity),
-          put(curvature),
-          comments,
-          ascii,
-          tell,
-        ),
-      );
-    }
-  }
+  return found;
 }
