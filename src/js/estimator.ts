@@ -29,7 +29,7 @@ type Prepared = readonly [call: Call, then?: () => Call];
 
 /** Starts an estimator; resolves when its worker is ready. */
 export async function createEstimator(host: Host, options: EstimatorOptions = {}): Promise<Estimator> {
-  want(options, 'options', options, 'an object');
+  checkNames(options, 'threads, wasmUrl, memoryMaxMiB');
   const { threads = 'auto', memoryMaxMiB = 4096, wasmUrl } = options;
   const isWhole = (value: number, from: number, to: number) => Number.isInteger(value) && from <= value && value <= to;
   want(threads === 'auto' || isWhole(threads, 1, 256), 'threads', threads, `'auto' or 1 to 256`);
@@ -44,6 +44,12 @@ export async function createEstimator(host: Host, options: EstimatorOptions = {}
   const [estimator, ready] = openEstimator(host, { threads, memoryMaxMiB, wasmUrl: folder });
   await ready();
   return estimator;
+}
+
+/** Refuses what is no object, and names that are misspelt, which may be inherited. */
+function checkNames(options: object, names: string, what = 'options') {
+  want(Object(options) === options, what, options, 'an object');
+  for (const name in options) want(names.split(', ').includes(name), 'an option', name, `any of ${names}`);
 }
 
 /** Calls that wait for one worker, which starts with the first of them. */
@@ -149,9 +155,10 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
   /** Queues what `prepare` makes, which copies or takes the arguments before its first wait. */
   async function run(
     options: ReadOptions,
+    names: string,
     prepare: (tell: Job['tell'], stop: AbortSignal) => Prepared | Promise<Prepared>,
   ): Promise<any> {
-    want(options, 'options', options, 'an object');
+    checkNames(options, `${names}, onProgress, signal`);
     const { signal, onProgress } = options;
     want((onProgress ?? want).call, 'onProgress', onProgress, 'a function');
     want((signal ?? AbortSignal.prototype).throwIfAborted, 'signal', signal, 'an AbortSignal');
@@ -213,7 +220,10 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
   return { run, dispose };
 }
 
-/** Whether the core suffices, which has no choices. It refuses names that are misspelt, the full module other values. */
+/** The options that the worker gets. */
+const values = 'method, cell, k, orient, curvature, components';
+
+/** Whether the core suffices, which has no choices. The full module refuses other values. */
 function isPlain({ method = 'bilinear', cell = 'auto', orient = 'none', k, curvature, components }: EstimateOptions) {
   return method === 'bilinear' && cell === 'auto' && orient === 'none' && k === undefined && !curvature && !components;
 }
@@ -229,14 +239,13 @@ export function openEstimator(
   const full = openQueue(host, { ...options, full: true });
   const estimator: Estimator = {
     estimateNormals: (positions, options = {}) =>
-      (isPlain(options ?? {}) ? core : full).run(options, () => {
+      (isPlain(options ?? {}) ? core : full).run(options, `${values}, transfer`, () => {
         const kind = kindOf(positions);
         want(/^Float(32|64)Array$/.test(kind), 'positions', positions, 'a Float32Array or Float64Array');
         const { length } = positions;
         want(length % 3 === 0, 'the length of positions', length, 'a multiple of 3, x y z of each point');
-        // By name, for they may be inherited; whatever else there is, the worker refuses.
-        const { transfer, signal, onProgress, method, cell, k, orient, curvature, components, ...rest } = options;
-        const named = { ...rest, method, cell, k, orient, curvature, components };
+        const { transfer, method, cell, k, orient, curvature, components } = options;
+        const named = { method, cell, k, orient, curvature, components };
         // What waits in the queue must not change, and a proxy of a framework cannot be posted.
         const plain = JSON.parse(JSON.stringify(named, keepNumbers));
         const call = (part: Part, take?: boolean): Call => ({
@@ -250,18 +259,20 @@ export function openEstimator(
       }),
 
     readPointCloud: (source, options = {}) =>
-      core.run(options, async (tell, stop) => {
+      core.run(options, 'maxPoints', async (tell, stop) => {
         const maxPoints = options.maxPoints && Number(options.maxPoints);
         return [{ kind: 'readPly', data: [await resolve(source, host.files, tell, stop), maxPoints] }];
       }),
 
     writePly: (cloud, add, options = {}) =>
-      full.run(options, async (tell, stop) => {
+      full.run(options, 'format', async (tell, stop) => {
+        // The last two are of a whole result, which may come too.
+        checkNames(add, 'normals, curvature, components, report', 'add');
         const { format = 'binary_little_endian' } = options;
         const ascii = format === 'ascii';
         want(ascii || format === 'binary_little_endian', 'format', format, `'binary_little_endian' or 'ascii'`);
-        const curvature = pack('curvature', add?.curvature);
-        const normals = pack('normals', add?.normals);
+        const curvature = pack('curvature', add.curvature);
+        const normals = pack('normals', add.normals);
         if (!(Object(cloud) === cloud && 'positions' in cloud))
           return [
             { kind: 'writePly', data: [await resolve(cloud, host.files, tell, stop), normals, curvature, ascii] },
@@ -293,7 +304,7 @@ export function openEstimator(
     },
   };
 
-  return [estimator, () => core.run({}, () => [{ kind: 'hello', data: [] }])];
+  return [estimator, () => core.run({}, '', () => [{ kind: 'hello', data: [] }])];
 }
 
 /** JSON has no NaN and no infinity, but an error must say that they came. */

@@ -169,7 +169,10 @@ export interface ReadOptions {
   maxPoints?: number;
 }
 
-/** What a file gains: `normals` as nx ny nz, three numbers a point; `curvature` one number a point. */
+/**
+ * What a file gains: `normals` as nx ny nz, three numbers a point; `curvature` one number a point. Another number of numbers,
+ * or another name, is an `input` error; but a whole `EstimateResult` may come, of which these are written.
+ */
 export interface Additions {
   normals?: Float32Array | undefined;
   curvature?: Float32Array | undefined;

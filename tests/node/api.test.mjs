@@ -418,7 +418,8 @@ test('a flat scan, dense round its scanner, is oriented in no time', async () =>
 });
 
 test('options may be inherited', async () => {
-  const { report } = await estimateNormals(sphere(1000), Object.create({ cell: { size: 0.25 } }));
+  const onProgress = () => {};
+  const { report } = await estimateNormals(sphere(1000), Object.create({ cell: { size: 0.25 }, onProgress }));
   assert.equal(report.cellSize, 0.25);
 });
 
@@ -447,7 +448,22 @@ test('wrong arguments are input errors that say what came and what was wanted', 
     [() => writePly({ count: 10, positions, source: { comments: ['a', 5] } }, {}), /a comment is 5; wanted a string/],
     [() => writePly({ count: 10, positions }, {}, { format: 'obj' }), /format is 'obj'; wanted/],
     [() => estimateNormals(positions, null), /options is null; wanted an object/],
-    [() => estimateNormals(positions, { cel: { scale: 2 } }), /option 'cel' is unknown; wanted any of method, cell/],
+    [
+      () => estimateNormals(positions, { cel: { scale: 2 } }),
+      /an option is 'cel'; wanted any of method, cell, .*, onProgress, signal$/,
+    ],
+    [() => estimateNormals(positions, { onprogress() {} }), /an option is 'onprogress'; wanted any of/],
+    [() => estimateNormals(positions, { cel: undefined }), /an option is 'cel'/],
+    [() => estimateNormals(positions, Object.create({ methd: 'knn' })), /an option is 'methd'/],
+    [() => estimateNormals(positions, 5), /options is 5; wanted an object/],
+    [() => createEstimator({ thread: 1 }), /'thread'; wanted any of threads, wasmUrl, memoryMaxMiB$/],
+    [() => readPointCloud(new Blob(), { maxPoint: 2 }), /'maxPoint'; wanted any of maxPoints, onProgress, signal$/],
+    [() => writePly(new Blob(), { normal: positions }), /'normal'; wanted any of normals, curvature/],
+    [
+      () => writePly({ count: 10, positions }, {}, { ascii: true }),
+      /'ascii'; wanted any of format, onProgress, signal$/,
+    ],
+    [() => writePly({ count: 10, positions }), /add is undefined; wanted an object/],
     [() => writePly('scan.ply', {}), /source is 'scan\.ply'; wanted/],
     [() => writePly({ positions: undefined }, {}), /positions is null; wanted a Float32Array/],
     [() => createEstimator({ threads: 0 }), /threads is 0; wanted 'auto' or 1 to 256/],
@@ -733,7 +749,7 @@ test('writePly keeps every property of a file, in both formats', async () => {
 test('a cloud written and read again is the same cloud', async () => {
   const cloud = await readPointCloud(new Blob([typed]));
   cloud.origin = [1000, 2000, 3000.5];
-  const blob = await writePly(cloud, {});
+  const blob = await writePly(cloud, { report: 'may come, as a part of the whole result' });
   assert.ok(blob instanceof Blob);
   const again = await readPointCloud(blob);
   const absolute = ({ positions, origin }) => [...positions].map((value, i) => value + origin[i % 3]);
