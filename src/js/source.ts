@@ -8,13 +8,10 @@ export const kindOf = (value: unknown): string => Object.prototype.toString.call
 /** Throws an `input` error that says what came and what was wanted, unless all is well. */
 export function want(well: unknown, name: string, value: any, wanted: string): asserts well {
   if (well) return;
-  const came =
-    typeof value === 'string'
-      ? `'${value}'`
-      : Object(value) === value
-        ? `${kindOf(value)}(${value.length ?? ''})`
-        : value;
-  throw new BilinormalError('input', `${name} is ${came}; wanted ${wanted}`);
+  const text = Object(value) === value ? `${kindOf(value)}(${value.length ?? ''})` : String(value);
+  // Not more than a line of it.
+  const [line] = /\S.{0,59}|$/.exec(text)!;
+  throw new BilinormalError('input', `${name} is ${typeof value === 'string' ? `'${line}'` : line}; wanted ${wanted}`);
 }
 
 /** A buffer, or as much of one as a view has. */

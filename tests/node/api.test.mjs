@@ -494,6 +494,24 @@ test('wrong arguments are input errors that say what came and what was wanted', 
   await assert.rejects(estimator.estimateNormals([]), failing('input', /Array\(0\)/));
 });
 
+test('an error tells a line of what came, not all of it', async () => {
+  const long = 'a line\n'.repeat(1e6);
+  const calls = [
+    readPointCloud(long),
+    estimateNormals(long),
+    estimateNormals(sphere(10), { [long]: 1 }),
+    estimateNormals(sphere(10), { orient: long.replaceAll('\n', ' ') }),
+    writePly(new Blob(), {}, { format: long }),
+    createEstimator({ threads: long }),
+    createEstimator({ threads: Symbol(long) }),
+    createEstimator({ memoryMaxMiB: 10n ** 100n }),
+  ];
+  for (const { reason } of await Promise.allSettled(calls)) {
+    assert.ok(reason.message.length < 250, reason.message.slice(0, 250));
+    failing('input', /^[^\n]* is ('a line|Symbol\(a line|10{59})[^\n]*; wanted [^\n]*$/)(reason);
+  }
+});
+
 test('a file with an error says where', async () => {
   const header =
     'ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\nend_header\n';
