@@ -3,7 +3,7 @@ import { BilinormalError } from './error.js';
 import { detect } from './features.js';
 import type { Call, Link, Reply, Start, StartWorker } from './protocol.js';
 import { kindOf, own, resolve, want, type Part } from './source.js';
-import type { EstimateOptions, Estimator, EstimatorOptions, ReadOptions } from './types.js';
+import type { EstimateOptions, Estimator, EstimatorOptions, Positions, ReadOptions } from './types.js';
 
 /** What an estimator needs from where it runs. */
 export interface Host {
@@ -40,7 +40,7 @@ export async function createEstimator(host: Host, options: EstimatorOptions = {}
   } catch {
     // Told with the others.
   }
-  want(folder || !wasmUrl, 'wasmUrl', wasmUrl, 'a string or URL that is an address');
+  want(folder || !wasmUrl, 'wasmUrl', wasmUrl, 'a valid URL or string');
   const [estimator, ready] = openEstimator(host, { threads, memoryMaxMiB, wasmUrl: folder });
   await ready();
   return estimator;
@@ -54,7 +54,7 @@ function checkNames(options: object, names: string, what = 'options') {
 
 /** Calls that wait for one worker, which starts with the first of them. */
 function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
-  const queue: Job[] = [];
+  let queue: Job[] = [];
   let running: Job | undefined;
   let link: Link | undefined;
   let channel: BroadcastChannel;
@@ -84,12 +84,9 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
 
   function next() {
     if (running || disposed) return;
-    running = queue.shift();
-    // One signal may have stopped many calls.
-    while (running?.signal?.aborted) {
-      running.reject(running.signal.reason);
-      running = queue.shift();
-    }
+    // One signal may stop many calls, of which each hears in its turn.
+    do running = queue.shift();
+    while (running?.signal?.aborted);
     if (!running) return link?.hold(false);
     attempt((job) => {
       job.begun = performance.now();
@@ -164,19 +161,18 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
     want((signal ?? AbortSignal.prototype).throwIfAborted, 'signal', signal, 'an AbortSignal');
     signal?.throwIfAborted();
     let told = 0;
-    let thrown: [unknown] | undefined;
+    const control = new AbortController();
+    const stop = control.signal;
     const tell = (phase: string, fraction: number) => {
       told = Math.max(told, fraction);
       try {
         onProgress?.({ phase, fraction: told });
       } catch (error) {
-        // A stream that it passes through makes another of it.
-        thrown = [error];
+        // As it is: a stream that it passes through makes another of it.
+        control.abort(error);
         throw error;
       }
     };
-    const control = new AbortController();
-    const stop = control.signal;
     open.add(control);
     signal?.addEventListener('abort', () => control.abort(signal.reason), { signal: stop });
     try {
@@ -188,9 +184,7 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
         job = { call, then, signal, tell, resolve, reject, begun: 0 };
         stop.addEventListener('abort', () => {
           if (running === job) return crash(stop.reason);
-          const at = queue.indexOf(job);
-          // Elsewhere: it is settled.
-          if (at >= 0) queue.splice(at, 1);
+          queue = queue.filter((other) => other !== job);
           reject(stop.reason);
         });
         queue.push(job);
@@ -201,7 +195,6 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
       return result;
     } catch (error) {
       if (stop.aborted) throw stop.reason;
-      if (thrown) throw thrown[0];
       // What JavaScript itself finds wrong with arguments.
       throw error instanceof TypeError ? new BilinormalError('input', error.message) : error;
     } finally {
@@ -242,18 +235,14 @@ export function openEstimator(
       (isPlain(options ?? {}) ? core : full).run(options, `${values}, transfer`, () => {
         const kind = kindOf(positions);
         want(/^Float(32|64)Array$/.test(kind), 'positions', positions, 'a Float32Array or Float64Array');
-        const { length } = positions;
-        want(length % 3 === 0, 'the length of positions', length, 'a multiple of 3, x y z of each point');
-        const { transfer, method, cell, k, orient, curvature, components } = options;
-        const named = { method, cell, k, orient, curvature, components };
-        // What waits in the queue must not change, and a proxy of a framework cannot be posted.
-        const plain = JSON.parse(JSON.stringify(named, keepNumbers));
+        countOf(positions);
+        const copied = values.split(', ').map((name) => [name, copy(name, options[name as keyof EstimateOptions])]);
         const call = (part: Part, take?: boolean): Call => ({
           kind: 'estimate',
-          data: [own(part, take), kind > 'Float5', plain],
+          data: [own(part, take), kind > 'Float5', Object.fromEntries(copied)],
         });
         // A buffer is not taken before the worker has tried the options, without points.
-        return transfer
+        return options.transfer
           ? [call({ buffer: positions.buffer, byteLength: 0 }), () => call(positions, true)]
           : [call(positions)];
       }),
@@ -277,14 +266,19 @@ export function openEstimator(
           return [
             { kind: 'writePly', data: [await resolve(cloud, host.files, tell, stop), normals, curvature, ascii] },
           ];
+        const positions = pack('positions', cloud.positions ?? null)!;
+        const count = countOf(cloud.positions);
+        want((cloud.count ?? count) === count, 'count', cloud.count, `${count}, that of positions`);
+        const origin = Float64Array.from(cloud.origin ?? [0, 0, 0]);
+        want(origin.length === 3 && origin.every(Number.isFinite), 'origin', cloud.origin, 'three finite numbers');
         const comments = [...(cloud.source?.comments ?? [])];
         for (const comment of comments) want(typeof comment === 'string', 'a comment', comment, 'a string');
         return [
           {
             kind: 'writeCloud',
             data: [
-              pack('positions', cloud.positions ?? null)!,
-              Float64Array.from(cloud.origin ?? [0, 0, 0]),
+              positions,
+              origin,
               normals ?? pack('normals', cloud.normals),
               pack('colors', cloud.colors, 'Uint8Array'),
               pack('intensity', cloud.intensity),
@@ -307,9 +301,24 @@ export function openEstimator(
   return [estimator, () => core.run({}, '', () => [{ kind: 'hello', data: [] }])];
 }
 
-/** JSON has no NaN and no infinity, but an error must say that they came. */
+/** The number of points; refuses a part of one. */
+function countOf({ length }: Positions) {
+  want(length % 3 === 0, 'the length of positions', length, 'a multiple of 3');
+  return length / 3;
+}
+
+/** A copy of an option: what waits in the queue must not change, and a proxy of a framework cannot be posted. */
+function copy(name: string, value: unknown) {
+  try {
+    return JSON.parse(JSON.stringify(value, keepNumbers));
+  } catch {
+    want(value === undefined, name, value, 'plain data');
+  }
+}
+
+/** JSON has no NaN, no infinity and no bigint, but an error must say that they came. */
 const keepNumbers = (_: string, value: unknown) =>
-  typeof value === 'number' && !Number.isFinite(value) ? String(value) : value;
+  /number|bigint/.test(typeof value) && !Number.isFinite(value) ? String(value) : value;
 
 /** A copy of an optional array; the worker counts what is in it. */
 function pack(name: string, array?: Float32Array | Uint8Array | null, kind = 'Float32Array'): Uint8Array | undefined {

@@ -427,6 +427,8 @@ test('wrong arguments are input errors that say what came and what was wanted', 
   const positions = sphere(10);
   const locked = new Response('ply');
   locked.body.getReader();
+  const circular = {};
+  circular.scale = circular;
   const blobOfFile = await openAsBlob(fileURLToPath(import.meta.url));
   const cases = [
     [() => estimateNormals([1, 2, 3]), /positions is Array\(3\); wanted a Float32Array or Float64Array/],
@@ -463,6 +465,11 @@ test('wrong arguments are input errors that say what came and what was wanted', 
       () => writePly({ count: 10, positions }, {}, { ascii: true }),
       /'ascii'; wanted any of format, onProgress, signal$/,
     ],
+    [() => writePly({ count: 9, positions }, {}), /count is 9; wanted 10, that of positions/],
+    [() => writePly({ positions: new Float32Array(4) }, {}), /length of positions is 4; wanted a multiple of 3/],
+    [() => writePly({ positions, origin: [0, 0] }, {}), /origin is Array\(2\); wanted three finite numbers/],
+    [() => writePly({ positions, origin: [0, NaN, 0] }, {}), /origin is Array\(3\); wanted three finite/],
+    [() => writePly({ positions, origin: 7 }, {}), /origin is 7; wanted three finite/],
     [() => writePly({ count: 10, positions }), /add is undefined; wanted an object/],
     [() => writePly('scan.ply', {}), /source is 'scan\.ply'; wanted/],
     [() => writePly({ positions: undefined }, {}), /positions is null; wanted a Float32Array/],
@@ -478,10 +485,14 @@ test('wrong arguments are input errors that say what came and what was wanted', 
     [() => createEstimator({ memoryMaxMiB: 5000 }), /memoryMaxMiB is 5000; wanted 16 to 4096/],
     [() => createEstimator(null), /options is null; wanted an object/],
     // What JavaScript itself finds wrong.
-    [() => createEstimator({ wasmUrl: 'http://[' }), /wasmUrl is 'http:\/\/\['; wanted a string or URL/],
-    [() => createEstimator({ wasmUrl: 5 }), /wasmUrl is 5; wanted a string or URL/],
-    [() => createEstimator({ wasmUrl: {} }), /wasmUrl is Object\(\); wanted a string or URL/],
-    [() => estimateNormals(positions, { k: 5n }), /BigInt/],
+    [() => createEstimator({ wasmUrl: 'http://[' }), /wasmUrl is 'http:\/\/\['; wanted a valid URL/],
+    [() => createEstimator({ wasmUrl: 5 }), /wasmUrl is 5; wanted a valid URL or string/],
+    [() => createEstimator({ wasmUrl: {} }), /wasmUrl is Object\(\); wanted a valid URL/],
+    [() => estimateNormals(positions, { k: 16n }), /k is '16'; wanted a whole number/],
+    [() => estimateNormals(positions, { cell: { size: 1n } }), /cell is \{"size":"1"\}; wanted 'auto'/],
+    [() => estimateNormals(positions, { cell: circular }), /cell is Object\(\); wanted plain data/],
+    [() => estimateNormals(positions, { k() {} }), /k is Function\(0\); wanted plain data/],
+    [() => estimateNormals(positions, { orient: Symbol('up') }), /orient is Symbol\(up\); wanted plain data/],
     [() => readPointCloud(locked), /locked/],
     [() => readPointCloud(blobOfFile), /wanted its bytes, or the URL of the file/],
   ];
