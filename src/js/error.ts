@@ -21,7 +21,7 @@ export class BilinormalError extends Error implements ErrorDetails {
   // Minified code gives classes other names.
   static override readonly name = 'BilinormalError';
   override readonly name = 'BilinormalError';
-  readonly code: ErrorCode;
+  declare readonly code: ErrorCode;
   declare readonly line?: number;
   declare readonly byte?: number;
   declare readonly needed?: number;

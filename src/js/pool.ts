@@ -19,21 +19,18 @@ export const pool: { start?: StartWorker; channel: string; kept?: unknown } = { 
 export async function startWorkers(module: WebAssembly.Module, memory: WebAssembly.Memory, builder: PoolBuilder) {
   const boot: ThreadBoot = { module, memory, receiver: builder.receiver(), channel: pool.channel };
   const links: Link[] = [];
-  const startThread = () =>
-    new Promise<void>((resolve, reject) => {
-      const fail = (reason: string) => reject(new Error(reason));
-      const link = pool.start!((reason?: string) => (reason ? fail(reason) : resolve()), fail);
-      links.push(link);
-      link.post(boot);
-    });
+  let waiting = builder.numThreads();
   let timer;
   try {
-    await Promise.race([
-      Promise.all(Array.from({ length: builder.numThreads() }, startThread)),
-      new Promise((_, reject) => {
-        timer = setTimeout(() => reject(new Error(`no answer in ${patience} s`)), patience * 1000);
-      }),
-    ]);
+    await new Promise<void>((resolve, reject) => {
+      const fail = (reason: string) => reject(new Error(reason));
+      timer = setTimeout(fail, patience * 1000, `no answer in ${patience} s`);
+      for (let i = waiting; i--;) {
+        const link = pool.start!((reason?: string) => (reason ? fail(reason) : --waiting || resolve()), fail);
+        links.push(link);
+        link.post(boot);
+      }
+    });
   } catch (error) {
     for (const link of links) link.end();
     throw error;

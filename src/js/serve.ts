@@ -82,7 +82,7 @@ async function answer(
     if (typeof part !== 'string' && !(part instanceof Blob)) return part;
     hear = (phase, fraction) => tell(phase, (1 + fraction) / 2);
     try {
-      const blob = typeof part === 'string' ? platform.open!(part) : part;
+      const blob = part instanceof Blob ? part : platform.open!(part);
       buffer = new glue.Buffer(blob.size);
       const ahead: Promise<ArrayBuffer>[] = [];
       for (let at = 0, next = 0; at < blob.size; at += pieceBytes) {
