@@ -87,11 +87,11 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
     // One signal may stop many calls, of which each hears in its turn.
     do running = queue.shift();
     while (running?.signal?.aborted);
-    if (!running) return link?.hold(false);
+    if (!running) return link?.hold?.(false);
     attempt((job) => {
       job.begun = performance.now();
       link ??= start();
-      link.hold(true);
+      link.hold?.(true);
       link.post(job.call);
       job.tell('start', 0);
     });
@@ -112,7 +112,7 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
     let answered = false;
     const failure = (reason: string) =>
       answered
-        ? new BilinormalError('limit', `wasm broke, most likely for want of memory (${reason})`)
+        ? new BilinormalError('limit', `wasm broke, most likely out of memory (${reason})`)
         : new BilinormalError('unsupported', `the worker did not start: ${reason}`);
     const fail = (reason: string) => {
       if (mine === link) crash(failure(reason));
@@ -303,7 +303,7 @@ export function openEstimator(
 
 /** The number of points; refuses a part of one. */
 function countOf({ length }: Positions) {
-  want(length % 3 === 0, 'the length of positions', length, 'a multiple of 3');
+  want(length % 3 === 0, 'positions.length', length, 'a multiple of 3');
   return length / 3;
 }
 

@@ -6,8 +6,8 @@ import type { EstimatorOptions, Report } from './types.js';
 export interface Link {
   /** Hands over the buffers of its arrays. */
   post(message: object): void;
-  /** Whether the process must stay alive for it (Node). */
-  hold(pending: boolean): void;
+  /** Whether the process must stay alive for it (Node only). */
+  hold?(pending: boolean): void;
   end(): void;
 }
 

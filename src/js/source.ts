@@ -21,6 +21,8 @@ export type Part = { buffer?: ArrayBufferLike; byteOffset?: number; byteLength: 
 export function own(from: Part, take?: boolean): Uint8Array<ArrayBuffer> {
   const { buffer = from as ArrayBuffer, byteOffset = 0, byteLength } = from;
   try {
+    // Throws if the view reaches beyond what is left of a resizable buffer: its length is 0 then.
+    (from as Partial<Uint8Array>).keys?.();
     const bytes = new Uint8Array(buffer, byteOffset, byteLength);
     return take &&
       byteLength === buffer.byteLength &&

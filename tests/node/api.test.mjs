@@ -369,6 +369,15 @@ test('transfer takes the buffer; views of parts and shared memory are copied', a
   }
 });
 
+test('a view that reaches beyond its resized buffer is refused, not taken for no points', async () => {
+  const buffer = new ArrayBuffer(120, { maxByteLength: 120 });
+  const view = new Float32Array(buffer, 0, 30);
+  buffer.resize(60);
+  for (const transfer of [false, true]) {
+    await assert.rejects(estimateNormals(view, { transfer }), failing('input', /buffer cannot be taken/));
+  }
+});
+
 test('positions are read when the call is made', async () => {
   const positions = sphere(5000);
   const expected = (await estimateNormals(positions)).normals;
@@ -466,7 +475,7 @@ test('wrong arguments are input errors that say what came and what was wanted', 
       /'ascii'; wanted any of format, onProgress, signal$/,
     ],
     [() => writePly({ count: 9, positions }, {}), /count is 9; wanted 10, that of positions/],
-    [() => writePly({ positions: new Float32Array(4) }, {}), /length of positions is 4; wanted a multiple of 3/],
+    [() => writePly({ positions: new Float32Array(4) }, {}), /positions\.length is 4; wanted a multiple of 3/],
     [() => writePly({ positions, origin: [0, 0] }, {}), /origin is Array\(2\); wanted three finite numbers/],
     [() => writePly({ positions, origin: [0, NaN, 0] }, {}), /origin is Array\(3\); wanted three finite/],
     [() => writePly({ positions, origin: 7 }, {}), /origin is 7; wanted three finite/],
