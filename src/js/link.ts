@@ -17,7 +17,6 @@ export const starter =
     };
     return {
       post: (message) => worker.postMessage(message, buffersOf(message)),
-      hold() {},
       end: () => worker.terminate(),
     };
   };
@@ -30,9 +29,13 @@ function fromAnywhere(direct: () => Worker): Worker {
   const Own = Worker;
   self.Worker = class extends Own {
     constructor(script: any, options?: WorkerOptions) {
-      const isForeign = /^http/.test(script) && new URL(script).origin !== origin;
-      const code = options?.type ? `import '${script}'` : `importScripts('${script}')`;
-      super(isForeign ? URL.createObjectURL(new Blob([code], { type: 'text/javascript' })) : script, options);
+      // In double quotes, which addresses have escaped.
+      const code = options?.type ? `import "${script}"` : `importScripts("${script}")`;
+      if (/^http/.test(script) && new URL(script).origin !== origin)
+        script = URL.createObjectURL(new Blob([code], { type: 'text/javascript' }));
+      super(script, options);
+      // Not before it has loaded: engines differ in when they read it.
+      this.addEventListener('message', () => URL.revokeObjectURL(script), { once: true });
     }
   };
   try {

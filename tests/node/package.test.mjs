@@ -4,6 +4,7 @@ import { execFileSync, spawnSync } from 'node:child_process';
 import { copyFileSync, existsSync, readFileSync, readdirSync, statSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
+import { pathToFileURL } from 'node:url';
 import { installPacked, root } from './packed.mjs';
 
 const { project, home, load } = installPacked();
@@ -70,6 +71,51 @@ test('the entry for browsers can be imported where there is no browser', async (
     console.log(typeof features);`);
   assert.equal(stderr, '');
   assert.equal(stdout, 'function\n');
+});
+
+test('a worker from another origin starts by a Blob that imports it, whose address goes when it has answered', async () => {
+  const started = [];
+  const revoked = [];
+  class Worker extends EventTarget {
+    constructor(script) {
+      super();
+      started.push(script);
+    }
+  }
+  const { createObjectURL, revokeObjectURL } = URL;
+  Object.assign(globalThis, { self: globalThis, origin: 'https://page.org', Worker });
+  URL.revokeObjectURL = (url) => revoked.push(url);
+  let blob;
+  URL.createObjectURL = (made) => {
+    blob = made;
+    return 'blob:it';
+  };
+  const { starter } = await import(pathToFileURL(join(home, 'dist', 'link.js')).href);
+  const start = (url, type) => {
+    let made;
+    starter(() => (made = new self.Worker(new URL(url), { type })))(
+      () => {},
+      () => {},
+    );
+    return made;
+  };
+  const address = `https://cdn.org/it's "here"/worker.js?a="'`;
+  const escaped = `https://cdn.org/it's%20%22here%22/worker.js?a=%22%27`;
+  for (const [type, code] of [
+    ['module', `import "${escaped}"`],
+    [undefined, `importScripts("${escaped}")`],
+  ]) {
+    const worker = start(address, type);
+    assert.equal(started.pop(), 'blob:it');
+    assert.equal(await blob.text(), code);
+    assert.deepEqual(revoked, []);
+    worker.dispatchEvent(new Event('message'));
+    assert.deepEqual(revoked.splice(0), ['blob:it']);
+  }
+  start('https://page.org/worker.js', 'module');
+  assert.equal(`${started.pop()}`, 'https://page.org/worker.js');
+  assert.equal(globalThis.Worker, Worker, 'as it was');
+  Object.assign(URL, { createObjectURL, revokeObjectURL });
 });
 
 test('the point material is lit, and its properties can be changed', async (context) => {
