@@ -10,7 +10,9 @@ export function scannerOf({ source, origin }: PointCloud): [number, number, numb
 
 /** The numbers of a comment such as `scanner position: 1.5, 0, 2`; with more or fewer it means something else. */
 function placeIn(comment: string): [number, number, number] | undefined {
-  if (!/(scanner|sensor|camera)[\W_]*(position|origin|location)|view[\W_]?point/i.test(comment)) return undefined;
+  // A whole word, for there are reviews.
+  const named = /(scanner|sensor|camera)[\W_]*(position|origin|location)|(?<![a-z])view[\W_]?point(?![a-z])/i;
+  if (!named.test(comment)) return undefined;
   const [x, y, z, ...more] = (comment.match(/[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?/gi) ?? []).map(Number);
   if (x === undefined || y === undefined || z === undefined || more.length > 0) return undefined;
   return Number.isFinite(x + y + z) ? [x, y, z] : undefined;
