@@ -1,4 +1,7 @@
-/** `x0 y0 z0 x1 ...`; the length is a multiple of 3. Views of a part of a buffer and of shared memory are accepted. */
+/**
+ * `x0 y0 z0 x1 ...` in any unit; another length than a multiple of 3 is an `input` error. Views of a part of a buffer and of
+ * shared memory are accepted.
+ */
 export type Positions = Float32Array | Float64Array;
 
 // Arrays that own plain, not shared memory, as Blobs and `postMessage` want them. Before TypeScript 5.7 no type says so.
@@ -8,7 +11,8 @@ type Bytes = ReturnType<typeof Uint8Array.of>;
 
 /**
  * Where bytes come from: a File or another Blob (streamed into the worker, never whole in JavaScript memory), bytes
- * (copied), or a URL or Response (downloaded; in Node, `file:` URLs too).
+ * (copied), or a URL or Response (downloaded; in Node, `file:` URLs too). Anything else, an answer that is no success, and what
+ * breaks off or cannot be read is an `input` error.
  */
 export type Source = Blob | ArrayBuffer | Uint8Array | URL | Response;
 
@@ -18,23 +22,24 @@ export interface Progress {
   fraction: number;
 }
 
+/** Whatever is not as described here, a name that is not here, and a value that JSON cannot hold is an `input` error. */
 export interface EstimateOptions {
   /**
    * Default `'bilinear'`: surfaces on a grid of cubes, with cubes of one size the paper's method. The others are its
    * baselines, eight to sixty times as slow as cubes of one size: `'knn'` fits a plane to the k nearest points, `'egg'` a
-   * curved surface to the neighbours in the elliptic Gabriel graph.
+   * curved surface to the neighbours in the elliptic Gabriel graph. Time grows with k for `'knn'`, with its square for `'egg'`.
    */
   method?: 'bilinear' | 'knn' | 'egg';
   /**
    * Size of the cubes of `'bilinear'`. Default `'auto'`: every place takes the size that its noise and its detail allow, and
    * edges stay sharp. With one size for all the method is exactly the paper's: `scale`, the edge in multiples of the
-   * paper's L (Eq. 1), 0.1 to 100; `size`, in the units of the input. Small cubes follow detail, large ones average noise
-   * away.
+   * paper's L (Eq. 1), 0.1 to 100; `size`, in the units of the input, above 0. Small cubes follow detail, large ones average
+   * noise away.
    */
   cell?: 'auto' | { scale: number } | { size: number };
   /**
-   * How many of the nearest points, at least 3: for `'knn'` with the point itself (default 16), for `'egg'` as candidates
-   * besides it (default 8).
+   * How many of the nearest points, a whole number from 3 to 4294967295; if there are fewer, all. For `'knn'` with the point
+   * itself (default 16), for `'egg'` as candidates besides it (default 8).
    */
   k?: number;
   /**
@@ -42,7 +47,8 @@ export interface EstimateOptions {
    * each connected surface, outwards if it is closed, else towards what stands before it; if nothing does, away from its
    * middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal. `'outward'`: the same for closed surfaces; of others
    * every part is turned to what it sees of the open, for heaps of parts and objects with holes.
-   * `viewpoint`: towards a position, in the coordinates of `positions`. `up`: towards a direction, for terrain.
+   * `viewpoint`: towards a position, in the coordinates of `positions`. `up`: towards a direction of any length but 0, for
+   * terrain. Both are arrays of three finite numbers.
    */
   orient?:
     'none' | 'consistent' | 'outward' | { viewpoint: [number, number, number] } | { up: [number, number, number] };
@@ -52,13 +58,13 @@ export interface EstimateOptions {
   components?: boolean;
   /**
    * Default false: the positions are copied when the call is made. True: their buffer is handed over and detached, when the
-   * call's turn has come and its options have passed: a call that is refused for its arguments, that is stopped while it waits,
-   * or whose worker does not start leaves it as it was; one that fails or is stopped later does not. Until the call
-   * has ended it must not change. A view of a part of a buffer, or of shared or resizable memory, is copied all the same, then:
-   * the rest is not the call's to take.
+   * call's turn has come and its options have passed. A call that is refused for its arguments, that is stopped while it
+   * waits, or whose worker does not start leaves it as it was; one that is stopped later, or for which memory does not
+   * suffice, does not. Until the call has ended the positions must not change. A view of a part of a buffer, or of shared or
+   * resizable memory, is copied at that moment: the rest is not the call's to take.
    */
   transfer?: boolean;
-  /** Hears a fraction that rises from 0 to exactly 1. */
+  /** Hears a fraction that rises from 0 to exactly 1. What it throws stops the call, which rejects with it. */
   onProgress?: (progress: Progress) => void;
   /** Rejects the call with `signal.reason`, at once; the estimator stays usable. */
   signal?: AbortSignal;
@@ -162,10 +168,16 @@ export interface PointCloud<F extends Float32Array = Floats, B extends Uint8Arra
   };
 }
 
+/** Of reading. Another name, and what is not as described here, is an `input` error. */
 export interface ReadOptions {
+  /** Rejects the call with `signal.reason`, at once, and stops a download; the estimator stays usable. */
   signal?: AbortSignal;
+  /** Hears a fraction that rises from 0 to exactly 1. What it throws stops the call, which rejects with it. */
   onProgress?: (progress: Progress) => void;
-  /** Refuse a file that has more points, before memory is taken for them. */
+  /**
+   * Refuses a file that declares more points, before memory is taken for them (`input`). A whole number of at least 0; default:
+   * as many as fit.
+   */
   maxPoints?: number;
 }
 
@@ -178,13 +190,17 @@ export interface Additions {
   curvature?: Float32Array | undefined;
 }
 
+/** Of writing. Another name, and what is not as described here, is an `input` error. */
 export interface WriteOptions {
-  /** Default `'binary_little_endian'`. */
+  /** Default `'binary_little_endian'`. Either keeps every number to its last digit. */
   format?: 'binary_little_endian' | 'ascii';
+  /** As in `ReadOptions`. */
   signal?: AbortSignal;
+  /** As in `ReadOptions`. */
   onProgress?: (progress: Progress) => void;
 }
 
+/** Another name, and what is not as described here, is an `input` error. */
 export interface EstimatorOptions {
   /**
    * 1 to 256 for each of the two workers; 1 is the single-threaded build. Default `'auto'`: one for each processor, at most
@@ -202,7 +218,9 @@ export interface EstimatorOptions {
 }
 
 export interface Features {
+  /** Whether calls run on threads; without, they do the same on one, to the same bit. */
   threads: boolean;
+  /** Whether the engine has the vectors of WebAssembly. Without, every call but this rejects (`unsupported`). */
   simd: boolean;
   /** Whether memory may be shared between threads. Node needs no isolation for that: true there. */
   crossOriginIsolated: boolean;
@@ -213,11 +231,26 @@ export interface Features {
 /**
  * Calls wait for each other; each has its own progress and abort. What needs the full module (see `wasmUrl`) has a worker and
  * a queue of its own: such a call and one of the others may run at once.
+ *
+ * Every call rejects with a `BilinormalError`, or with `signal.reason`, or with what `onProgress` throws. Codes that all have:
+ * `input`, the arguments, or the estimator was disposed; `limit`, memory does not suffice, or wasm broke for want of it: then the
+ * next call starts with a new worker; `unsupported`, no SIMD, or the package's own files did not load.
  */
 export interface Estimator {
+  /**
+   * One normal for each point, and what else the options ask for. Memory: at least 28 bytes a point, 40 if signs need
+   * positions; it is refused beforehand if that is not to be had (`limit`).
+   */
   estimateNormals(positions: Positions, options?: EstimateOptions): Promise<EstimateResult>;
+  /** The points of a PLY file in any of its three formats; also `format`: the file is none, or broken (`line` or `byte`). */
   readPointCloud(source: Source, options?: ReadOptions): Promise<PointCloud>;
+  /**
+   * A PLY file: a file's, with everything kept but the normals, or a cloud's. Also `input`: arrays whose lengths do not fit the
+   * points (three numbers a point; `colors` four, `intensity` and `curvature` one), another `count`, an `origin` that is not
+   * three finite numbers; and `format`, as for reading.
+   */
   writePly(cloud: PointCloud<Float32Array, Uint8Array> | Source, add: Additions, options?: WriteOptions): Promise<Blob>;
+  /** What this engine and this page allow. Never rejects. */
   features(): Promise<Features>;
   /** Ends the workers, their threads and downloads; calls that wait or run, and later ones, reject (`input`). */
   dispose(): void;
