@@ -112,17 +112,20 @@ function start(viewer: Viewer): void {
   else session.warm();
 }
 
-/** What the status line takes, in pixels (style.css), with the facts of most scans; a low window does without these. */
-const STATUS = { width: 396, height: 212, low: 120 };
+/**
+ * What the status line takes, in pixels (style.css), with the facts of most scans; a low window does without these, and
+ * below the open panel of a small screen there is the headline only.
+ */
+const STATUS = { width: 396, height: 212, low: 120, least: 76 };
 
 /**
  * What the panel and the status line cover, for a cloud beside that line or above it; on a small screen for one between the
- * panel and that line, which the open panel replaces.
+ * panel and that line.
  */
 function marginsOf(small: boolean, low: boolean): Margins[] {
   const { offsetWidth: width, offsetHeight: height, offsetTop: gap, open } = element<HTMLDetailsElement>('#panel');
   const bottom = low ? STATUS.low : STATUS.height;
-  if (small) return [{ top: height + gap, right: 0, bottom: open ? 0 : bottom, left: 0 }];
+  if (small) return [{ top: height + gap, right: 0, bottom: open ? STATUS.least : bottom, left: 0 }];
   const right = width + gap;
   return [
     { top: 0, right, bottom: 0, left: STATUS.width },
