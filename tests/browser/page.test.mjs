@@ -530,6 +530,7 @@ test('normals that the file had are compared with the computed ones, and shown i
   const computed = await colorsShown(page);
   await fromFile.check();
   assert.ok((await colorsShown(page)) < computed / 10);
+  assert.ok(await page.getByRole('button', { name: 'Save computed normals' }).isVisible());
   // What is flipped and saved is what was computed, and it is shown again.
   await page.getByRole('button', { name: 'Flip all' }).click();
   assert.ok(await page.getByRole('radio', { name: 'Computed' }).isChecked());

@@ -77,6 +77,8 @@ export function showState(store: Store): void {
     element('#hint').hidden = !turning;
     const save = element<HTMLButtonElement>('[data-do=save]');
     save.disabled = !scan?.hasNormals;
+    // Not what is shown then.
+    save.textContent = state.source === 'file' ? 'Save computed normals' : 'Save as PLY';
     rest(save, busy);
 
     showOptions(state, busy);
