@@ -280,10 +280,10 @@ function negate(normals: Float32Array, components?: Uint32Array, surface?: numbe
   }
 }
 
-/** What cannot be read says so when it is. */
+/** As the reader takes it: in any case, and after a byte order mark, which `text` drops. What cannot be read says so then. */
 async function beginsAsPly(file: File): Promise<boolean> {
   try {
-    return (await file.slice(0, 3).text()) === 'ply';
+    return /^ply/i.test(await file.slice(0, 6).text());
   } catch {
     return true;
   }
