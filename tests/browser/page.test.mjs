@@ -647,10 +647,13 @@ test('where the file says that the scanner stood is offered as a viewpoint', asy
     );
     assert.ok(Math.abs(inwards - expected) < 0.02, `${inwards} from ${place}`);
   }
-  // A scan without one is not asked for it.
-  await drop(page, 'ball.ply', ball);
-  await result(page, 'ball.ply');
-  assert.ok(await orientation('Consistent').isChecked());
+  // A scan without one is not asked for it, and where the camera was is not where it is for the next scan.
+  for (const name of ['ball.ply', 'next.ply']) {
+    await drop(page, name, ball);
+    await result(page, name);
+    assert.ok(await orientation('Consistent').isChecked());
+    await orientation('Camera').check();
+  }
 });
 
 test('a flip turns what is saved, again undoes it, and curvature keeps it', async () => {

@@ -114,7 +114,8 @@ export function createSession(store: Store, viewer: Viewer): Session {
       hadNormals: normals !== undefined,
     };
     const { orientKind } = store.state;
-    // An edge length belongs to the unit of the file before.
+    // Where the camera or the scanner was belongs to the file before, and so does an edge length, in its unit.
+    const isPast = orientKind === 'camera' || (orientKind === 'scanner' && !scan.scanner);
     store.set({
       scan,
       report: undefined,
@@ -127,7 +128,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
       shading,
       cellKind: 'auto',
       cellText: '',
-      orientKind: orientKind === 'scanner' && !scan.scanner ? 'consistent' : orientKind,
+      orientKind: isPast ? 'consistent' : orientKind,
     });
   }
 
