@@ -684,9 +684,13 @@ test('a flip turns what is saved, again undoes it, and curvature keeps it', asyn
   );
 
   // The key takes back what the button has done, and no more.
+  const backs = page.getByRole('checkbox', { name: 'Back faces' });
+  await backs.uncheck();
   await flip.click();
+  assert.ok(await backs.isChecked());
   for (let presses = 1; presses <= 4; presses++) await page.keyboard.press('Control+z');
   assert.equal(await flip.getAttribute('aria-pressed'), 'false');
+  assert.ok(!(await backs.isChecked()), 'the flip had switched it on');
 
   // What is computed anew is as its orientation promises, and says so.
   assert.doesNotMatch(await page.locator('#facts').innerText(), /were reset/);

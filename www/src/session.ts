@@ -55,8 +55,8 @@ interface Step {
 export function createSession(store: Store, viewer: Viewer): Session {
   let current: AbortController | undefined;
   let shown: Shown | undefined;
-  /** What was flipped by hand, the last at the end: surfaces, and undefined for all. */
-  let flips: (number | undefined)[] = [];
+  /** What was flipped by hand, the last at the end: a surface, or undefined for all, and whether it brought back faces. */
+  let flips: { surface: number | undefined; broughtBacks: boolean }[] = [];
 
   /** Runs one job to its end; what it throws becomes the message on the page, unless it was cancelled. */
   async function run(trouble: string, work: (step: Step) => Promise<void>): Promise<void> {
@@ -167,21 +167,30 @@ export function createSession(store: Store, viewer: Viewer): Session {
     store.set({ scan: { ...scan, hasNormals: true, hasCurvature }, report, used, ...turned, ...compared(shown) });
   }
 
+  /** Flips one surface, or all, in a way that can be taken back. */
+  function flip(surface?: number): void {
+    if (!shown?.result) return;
+    const { backs, shading } = store.state;
+    // Without back faces both sides look the same when shaded; normals as colours do not.
+    const broughtBacks = !backs && shading === 'shaded';
+    flips.push({ surface, broughtBacks });
+    turnRound(surface, backs || broughtBacks);
+  }
+
   /** Turns round the computed normals of one surface, or all. */
-  function turnRound(surface: number | undefined): void {
+  function turnRound(surface: number | undefined, backs: boolean): void {
     if (!shown?.result) return;
     const { normals, components } = shown.result;
     negate(normals, surface === undefined ? undefined : components, surface);
     viewer.refreshNormals(normals);
-    const { flipped, backs, shading } = store.state;
+    const { flipped } = store.state;
     const turnedSurfaces = new Set(store.state.turnedSurfaces);
     if (surface !== undefined && !turnedSurfaces.delete(surface)) turnedSurfaces.add(surface);
     store.set({
       flipped: flipped !== (surface === undefined),
       turnedSurfaces,
       wereReset: false,
-      // Without back faces both sides look the same when shaded; normals as colours do not.
-      backs: backs || shading === 'shaded',
+      backs,
       ...compared(shown),
     });
   }
@@ -232,21 +241,18 @@ export function createSession(store: Store, viewer: Viewer): Session {
       store.set({ source });
     },
 
-    flip() {
-      turnRound(undefined);
-      flips.push(undefined);
-    },
+    flip: () => flip(),
 
     flipSurface(point) {
       const surface = shown?.result?.components?.[point];
       if (surface === undefined || surface === NO_SURFACE) return false;
-      turnRound(surface);
-      flips.push(surface);
+      flip(surface);
       return true;
     },
 
     undoFlip() {
-      if (flips.length > 0) turnRound(flips.pop());
+      const last = flips.pop();
+      if (last) turnRound(last.surface, store.state.backs && !last.broughtBacks);
     },
 
     save: () =>

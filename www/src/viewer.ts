@@ -244,7 +244,10 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     request();
   }
 
-  /** How far away, looking along `direction`, the box (half edges) or the unit ball just fills what is not covered. */
+  /**
+   * How far away, looking along `direction`, the discs of the points in the box (half edges) or in the unit ball just fill
+   * what is not covered.
+   */
   function framingDistance(direction: Vector3, half: Vector3, { top, right: end, bottom, left }: Margins): number {
     const { clientWidth: width, clientHeight: height } = canvas;
     const slope = Math.tan((camera.fov * Math.PI) / 360) / height;
@@ -254,13 +257,14 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     const upright = slope * Math.max(height - top - bottom, share * height);
     const right = new Vector3(0, 1, 0).cross(direction).normalize();
     const above = new Vector3().crossVectors(direction, right);
-    let distance = 0;
+    const disc = (pointSize * closing) / 2;
+    let distance = half.lengthSq() > 0 ? 0 : Infinity;
     for (let corner = 0; corner < 8; corner++) {
       const at = half.clone().multiply(new Vector3(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1));
-      const beside = Math.max(Math.abs(at.dot(right)) / across, Math.abs(at.dot(above)) / upright);
+      const beside = Math.max((Math.abs(at.dot(right)) + disc) / across, (Math.abs(at.dot(above)) + disc) / upright);
       distance = Math.max(distance, beside + at.dot(direction));
     }
-    return Math.min(distance || Infinity, 1 / Math.sin(Math.atan(Math.min(across, upright))));
+    return Math.min(distance, (1 + disc) / Math.sin(Math.atan(Math.min(across, upright))));
   }
 
   function resize(): void {
