@@ -126,10 +126,11 @@ function marginsOf(small: boolean, low: boolean): Margins[] {
   const { offsetWidth: width, offsetHeight: height, offsetTop: gap, open } = element<HTMLDetailsElement>('#panel');
   const bottom = low ? STATUS.low : STATUS.height;
   if (small) return [{ top: height + gap, right: 0, bottom: open ? STATUS.least : bottom, left: 0 }];
-  const right = width + gap;
+  // Closed, it is as wide, and leaves what is below it.
+  const [top, right] = open ? [0, width + gap] : [height + gap, 0];
   return [
-    { top: 0, right, bottom: 0, left: STATUS.width },
-    { top: 0, right, bottom, left: 0 },
+    { top, right, bottom: 0, left: STATUS.width },
+    { top, right, bottom, left: 0 },
   ];
 }
 
