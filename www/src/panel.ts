@@ -292,12 +292,14 @@ function showResult(state: State): void {
   const list = element('#phases');
   bar.replaceChildren();
   list.replaceChildren();
-  for (const [phase, milliseconds] of phases) {
+  for (const [i, [phase, milliseconds]] of phases.entries()) {
     const part = make('span', '');
     part.style.flexGrow = String(milliseconds);
     part.title = `${phaseName(phase)}: ${duration(milliseconds)}`;
+    const name = make('dt', phaseName(phase));
+    for (const colored of [part, name]) colored.style.setProperty('--phase', String(i));
     bar.append(part);
-    list.append(make('dt', phaseName(phase)), make('dd', duration(milliseconds)));
+    list.append(name, make('dd', duration(milliseconds)));
   }
   list.append(make('dt', 'reading the file', 'apart'), make('dd', duration(scan.readMilliseconds), 'apart'));
 }
