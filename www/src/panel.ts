@@ -204,14 +204,20 @@ type Largest = NonNullable<Report['components']>['largest'][number];
 const WAYS = {
   air: ['outwards', 'inwards'],
   volume: ['away from the middle', 'towards the middle'],
-  sight: ['towards what stands before it', 'away from what stands before it'],
+  sight: ['to what stands before it', 'from what stands before it'],
 } as const;
 
-function facing({ side, confidence }: Largest, isTurned: boolean): HTMLElement {
-  if (side === 'convention') return fact('no outside', 'found for it');
+/** Below it, the side is little more than a guess. */
+const SURE = 0.3;
+
+function facing({ side, confidence }: Largest, isTurned: boolean): HTMLElement[] {
+  const advice = fact('Upwards or Camera', 'may be surer');
+  if (side === 'convention') return [fact('no outside', 'found for it'), advice];
   const [way, opposite] = WAYS[side];
   const about = 'Which way the largest surface faces, and how sure that is, from 0 to 1';
-  return fact(isTurned ? opposite : way, `with confidence ${confidence.toFixed(2)}`, about);
+  const isSure = confidence >= SURE;
+  const told = fact(isTurned ? opposite : way, `${isSure ? 'confidence' : 'unsure,'} ${confidence.toFixed(2)}`, about);
+  return isSure ? [told] : [told, advice];
 }
 
 /** How the signs were chosen: for surfaces, the largest one and which way it faces. */
@@ -224,7 +230,7 @@ function signsOf({ components, points }: Report, { scan, used, flipped, turnedSu
     return [
       ...facts,
       fact(percent(largest.points, points), 'in the largest'),
-      facing(largest, flipped !== turnedSurfaces.has(0)),
+      ...facing(largest, flipped !== turnedSurfaces.has(0)),
       ...(turned ? [fact(count(turned), 'flipped by hand')] : []),
     ];
   }
