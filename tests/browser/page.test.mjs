@@ -901,6 +901,11 @@ test('on a phone the cloud is seen below the open panel, and fingers meet what t
     };
     // A surface is flipped with the panel out of the way, and the hint takes the place of the result.
     await page.getByRole('button', { name: 'Flip one' }).tap();
+    assert.ok(!/Ctrl|Enter/.test(await page.locator('#hint').innerText()), 'no keys without a keyboard');
+    const undo = page.getByRole('button', { name: 'Undo' });
+    await undo.tap();
+    assert.ok(await undo.isDisabled());
+    await page.evaluate(() => document.querySelector('[data-do=flip]').click());
     assert.equal(await hideAndCount('#hint'), 0, 'the hint covers nothing');
     await page.evaluate(() => (document.querySelector('#panel').open = true));
     assert.ok((await backsShown(page, { clip: { x: 0, y: 0, width, height } })) > 0.05, 'the cloud is seen');

@@ -48,6 +48,7 @@ function start(viewer: Viewer): void {
     fit: () => viewer.fit(),
     flip: () => session.flip(),
     turn: () => turnSurfaces(!store.state.turning),
+    undo: () => session.undoFlip(),
     done: () => turnSurfaces(false),
     save: () => {
       if (!store.state.job) void session.save();

@@ -75,6 +75,7 @@ export function showState(store: Store): void {
     const turning = state.turning && !turn.disabled;
     document.documentElement.classList.toggle('turning', turning);
     element('#hint').hidden = !turning;
+    element<HTMLButtonElement>('[data-do=undo]').disabled = !state.flipped && state.turnedSurfaces.size === 0;
     const save = element<HTMLButtonElement>('[data-do=save]');
     save.disabled = !scan?.hasNormals;
     // Not what is shown then.
