@@ -665,6 +665,7 @@ test('a flip turns what is saved, again undoes it, and curvature keeps it', asyn
   await flip.click();
   assert.equal(await flip.getAttribute('aria-pressed'), 'true');
   assert.match(await page.locator('#facts').innerText(), /inwards/);
+  assert.equal(await page.locator('#told').textContent(), 'All flipped');
   const turned = before.map((value, i) => (i % 6 < 3 ? value : 0 - value));
   assert.deepEqual(readSaved((await save(page)).bytes), turned);
   assert.ok((await backsShown(page)) > 0.9, 'a flip can be seen');
@@ -729,6 +730,7 @@ test('one surface is turned by a click, or by Enter in the middle of the view', 
   // Later, or it is a third click; and where the view is centred now.
   await page.waitForTimeout(600);
   await canvas.click({ position: middle });
+  assert.equal(await page.locator('#told').textContent(), '1 surface flipped by hand');
   const turned = before.map((value, i) => (i % 12 < 3 || i % 12 > 5 ? value : 0 - value));
   assert.deepEqual(readSaved((await save(page)).bytes), turned);
   assert.match(await page.locator('#facts').innerText(), /\b1 flipped by hand/);

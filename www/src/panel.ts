@@ -106,8 +106,10 @@ function moveFocus({ scan, job }: State): void {
 function tell({ job, flipped, turnedSurfaces }: State, before: State | undefined): void {
   const told = element('#told');
   if (before?.job?.title !== job?.title) told.textContent = job?.title ?? '';
-  else if (before && !job && (before.flipped !== flipped || before.turnedSurfaces !== turnedSurfaces)) {
-    told.textContent = [...element('#facts').children].map((fact) => fact.textContent).join(', ');
+  else if (!before || job) return;
+  else if (before.flipped !== flipped) told.textContent = flipped ? 'All flipped' : 'All flipped back';
+  else if (before.turnedSurfaces !== turnedSurfaces) {
+    told.textContent = `${count(turnedSurfaces.size)} ${plural(turnedSurfaces.size, 'surface')} flipped by hand`;
   }
 }
 
