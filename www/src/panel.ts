@@ -279,7 +279,7 @@ function showResult(state: State): void {
   facts.replaceChildren();
   const fallback = element('#fallback');
   fallback.hidden = !report?.fallbackReason;
-  fallback.textContent = report?.fallbackReason ? `One thread: ${report.fallbackReason}` : '';
+  fallback.title = report?.fallbackReason ?? '';
   element('#status details').hidden = report === undefined;
   if (!report) return;
 
