@@ -48,7 +48,7 @@ export async function openBrowser() {
       });
       if (options.script) await page.addInitScript(options.script);
       await page.goto(address);
-      await page.locator('[data-do=choose]:enabled, #unsupported:not([hidden])').first().waitFor({ state: 'attached' });
+      await page.locator('[data-do=choose]:enabled, #notice:not([hidden])').first().waitFor({ state: 'attached' });
       return page;
     },
     /** Errors on a page and requests to other hosts since the last call. */

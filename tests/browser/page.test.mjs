@@ -113,7 +113,7 @@ test('a job can be cancelled while it reads and while it computes, and the next 
   await pressWhen('Reading', 'cancel');
   await choose(page, 'large.ply', large);
   await page.locator('#start').waitFor();
-  assert.ok(await page.locator('#error').isHidden(), 'to cancel is no error');
+  assert.ok(await page.locator('#notice').isHidden(), 'to cancel is no error');
 
   await pressWhen('Computing', 'Escape');
   await choose(page, 'large.ply', large);
@@ -153,7 +153,7 @@ test('what is no scan stops no work', async () => {
   await page.getByRole('button', { name: 'Re-run' }).click();
   await page.locator('#job').waitFor();
   await drop(page, 'notes.txt', Buffer.from('Milk, bread'));
-  await page.getByText('notes.txt is no PLY file').waitFor();
+  await page.getByText('Only PLY files can be opened; notes.txt is none').waitFor();
   assert.ok(await page.locator('#job').isVisible());
   assert.equal(await page.locator('#name').textContent(), 'ball.ply');
   // A scan does, also where it begins with a byte order mark and with capitals.
@@ -178,7 +178,7 @@ test('a bad file gives a message that can be read, and the cloud before stays', 
   await drop(page, 'photo.ply', Buffer.from('GIF89a, not a scan'));
   const alert = page.getByRole('alert').filter({ hasText: 'photo.ply' });
   await alert.waitFor();
-  assert.match(await alert.textContent(), /photo\.ply: .*ply/);
+  assert.match(await alert.textContent(), /^Only PLY files can be opened; photo\.ply is not .*GIF89a/);
   assert.ok(await page.locator('#start').isVisible());
 
   await drop(page, 'ball.ply', spherePly(5_000));

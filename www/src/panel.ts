@@ -28,7 +28,7 @@ export function showState(store: Store): void {
   const start = element('#start');
   const canvas = element('#canvas');
   const panel = element<HTMLDetailsElement>('#panel');
-  const unsupported = element('#unsupported');
+  const notice = element('#notice');
   const title = document.title;
   let drawn: State | undefined;
 
@@ -43,8 +43,11 @@ export function showState(store: Store): void {
     panel.hidden = scan === undefined;
     // Nothing to see takes no focus.
     canvas.inert = scan === undefined;
-    unsupported.hidden = state.unsupported === undefined;
-    unsupported.textContent = state.unsupported ?? '';
+    // Near the buttons as long as there is nothing else to see.
+    const trouble = state.unsupported ?? (start.hidden ? undefined : error);
+    notice.hidden = trouble === undefined;
+    notice.textContent = trouble ?? '';
+    notice.scrollIntoView({ block: 'nearest' });
     for (const button of document.querySelectorAll<HTMLButtonElement>('[data-do=choose], [data-do=sample]')) {
       button.disabled = !state.ready;
     }
@@ -83,7 +86,7 @@ export function showState(store: Store): void {
     rest(save, busy);
 
     showOptions(state, busy);
-    showError(error);
+    showError(start.hidden ? error : undefined);
     showJob(state);
     const same =
       before?.scan === scan &&

@@ -32,6 +32,7 @@ export interface Session {
 }
 
 const SAMPLE_POINTS = 500_000;
+const ONLY_PLY = 'Only PLY files can be opened';
 /** The surface of a point without a normal. */
 const NO_SURFACE = 0xffff_ffff;
 
@@ -76,7 +77,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
         },
       });
     } catch (error) {
-      if (!mine.signal.aborted) store.set({ error: `${trouble}: ${messageOf(error)}` });
+      if (!mine.signal.aborted) store.set({ error: messageOf(trouble, error) });
     }
     if (current === mine) end();
   }
@@ -207,7 +208,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
     async open(file) {
       // What was dropped by mistake stops no work, unless that ends meanwhile.
       if (current && !(await beginsAsPly(file)) && current) {
-        store.set({ error: `${file.name} is no PLY file, so the work on the one before goes on` });
+        store.set({ error: `${ONLY_PLY}; ${file.name} is none, so the work goes on` });
         return;
       }
       await run(file.name, async (step) => {
@@ -315,6 +316,8 @@ function download(blob: Blob, name: string): void {
   setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
 }
 
-function messageOf(error: unknown): string {
-  return error instanceof Error ? error.message : String(error);
+function messageOf(trouble: string, error: unknown): string {
+  // Where a file begins tells nothing.
+  const message = (error instanceof Error ? error.message : String(error)).replace(/^byte 0: /, '');
+  return message.startsWith('not a PLY file') ? `${ONLY_PLY}; ${trouble} is ${message}` : `${trouble}: ${message}`;
 }
