@@ -30,12 +30,16 @@ export const ISOLATION = {
 };
 
 /**
- * The headers that the page in a folder wants: isolation, and its own Content-Security-Policy, which as a <meta> holds
- * for the page but not for its workers.
+ * The headers that the page in a folder wants: isolation, types that are taken as they are told, and its own
+ * Content-Security-Policy, which as a <meta> holds for the page but not for its workers, and can't forbid frames.
  */
 export function pageHeaders(folder) {
   const [, policy] = readFileSync(join(folder, 'index.html'), 'utf8').match(/content="(default-src[^"]*)"/);
-  return { ...ISOLATION, 'Content-Security-Policy': policy };
+  return {
+    ...ISOLATION,
+    'X-Content-Type-Options': 'nosniff',
+    'Content-Security-Policy': `${policy}; frame-ancestors 'none'`,
+  };
 }
 
 /**
