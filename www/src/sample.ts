@@ -76,7 +76,7 @@ function shellColor(u: number, v: number, out: Vector): void {
   mix([0.95, 0.89, 0.8], [0.71, 0.36, 0.2], band, out);
 }
 
-// The plinth: a profile turned round the y axis, [radius, height] from the middle of the top down to the foot.
+// The plinth: a profile turned round the y axis, [radius, height] from the middle of the top down to that of the foot.
 const PROFILE: [number, number][] = [
   [0, 0.06],
   [0.139, 0.06],
@@ -87,6 +87,7 @@ const PROFILE: [number, number][] = [
   [0.147, 0.008],
   [0.15, 0.004],
   [0.15, 0],
+  [0, 0],
 ];
 const FLUTES = 36;
 
