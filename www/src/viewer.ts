@@ -73,7 +73,7 @@ const SLOW_FRAME = 36;
 /** Time without movement after which the whole cloud is drawn. */
 const STILL = 140;
 /** Points without order need this many times the spacing of an even pattern to close a surface. */
-const CLOSING = 2.2;
+const CLOSING = 2.8;
 /** Most that a point measures without a choice of its size, where the bulk of the cloud has radius 1: a few are dots. */
 const LARGEST = 0.2;
 
