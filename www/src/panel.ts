@@ -271,7 +271,10 @@ function showResult(state: State): void {
   const { scan, report, used, comparison } = state;
   element('#status').hidden = scan === undefined;
   if (!scan) return;
-  write('#total', report ? duration(report.milliseconds.total) : count(scan.points));
+  const { total = 0, ...inside } = report?.milliseconds ?? {};
+  const phases = Object.entries(inside);
+  const computing = phases.reduce((sum, [, milliseconds]) => sum + milliseconds, 0);
+  write('#total', report ? duration(computing) : count(scan.points));
   const points = plural(scan.points, 'point');
   const remedy = report && report.cellSize > 0 && report.noise === undefined ? ', try the size Auto' : '';
   const none = report?.unresolved === scan.points ? `: no normal was found${remedy}` : '';
@@ -296,10 +299,6 @@ function showResult(state: State): void {
   );
   facts.dataset['mode'] = report.mode;
 
-  const { total, ...inside } = report.milliseconds;
-  const phases = Object.entries(inside);
-  const around = total - phases.reduce((sum, [, milliseconds]) => sum + milliseconds, 0);
-  phases.push(['start of the worker, copies', Math.max(0, around)]);
   const bar = element('#status .bar');
   const list = element('#phases');
   bar.replaceChildren();
@@ -313,5 +312,9 @@ function showResult(state: State): void {
     bar.append(part);
     list.append(name, make('dd', duration(milliseconds)));
   }
-  list.append(make('dt', 'reading the file', 'apart'), make('dd', duration(scan.readMilliseconds), 'apart'));
+  // The page draws the bare points meanwhile, and has the result only then.
+  const apart = { 'start, copies, drawing meanwhile': total - computing, 'reading the file': scan.readMilliseconds };
+  for (const [name, milliseconds] of Object.entries(apart)) {
+    list.append(make('dt', name, 'apart'), make('dd', duration(Math.max(0, milliseconds)), 'apart'));
+  }
 }
