@@ -447,6 +447,24 @@ test('plus enlarges the cloud, minus makes it smaller, F fits it, B shows back f
   assert.equal(await share(), before);
 });
 
+test('a question mark opens the help, and Escape or a click closes it and nothing else', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'ball.ply', spherePly(5_000));
+  await result(page, 'ball.ply');
+  const help = page.getByRole('dialog', { name: 'How to move' });
+  await page.getByRole('button', { name: 'Flip one' }).click();
+  for (const open of [() => page.keyboard.press('?'), () => page.getByRole('button', { name: 'Help' }).click()]) {
+    for (const close of [() => page.keyboard.press('Escape'), () => page.mouse.click(20, 20)]) {
+      await open();
+      assert.ok(await help.isVisible());
+      assert.ok(await help.evaluate(({ scrollWidth, clientWidth }) => scrollWidth <= clientWidth), 'all of it');
+      await close();
+      await help.waitFor({ state: 'hidden' });
+    }
+  }
+  assert.ok(await page.locator('#hint').isVisible());
+});
+
 test('the view follows the window until it is moved', async () => {
   page = await browser.openPage(browser.isolated);
   await drop(page, 'ball.ply', spherePly(20_000));

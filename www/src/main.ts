@@ -30,6 +30,7 @@ function start(viewer: Viewer): void {
   const input = element<HTMLInputElement>('#file');
   const panel = element<HTMLDetailsElement>('#panel');
   const canvas = element('#canvas');
+  const help = element<HTMLDialogElement>('#help');
   const small = matchMedia('(max-width: 640px)');
   const low = matchMedia('(max-height: 520px)');
   const makeRoom = () => viewer.setMargins(marginsOf(small.matches, low.matches));
@@ -46,6 +47,7 @@ function start(viewer: Viewer): void {
     choose: () => input.click(),
     sample: () => void session.openSample(),
     fit: () => viewer.fit(),
+    help: () => help.showModal(),
     flip: () => session.flip(),
     turn: () => turnSurfaces(!store.state.turning),
     undo: () => session.undoFlip(),
@@ -65,7 +67,11 @@ function start(viewer: Viewer): void {
     // The same file chosen again is a change again.
     input.value = '';
   });
+  // Anywhere, also beside it.
+  help.addEventListener('click', () => help.close());
   addEventListener('keydown', (event) => {
+    // The browser closes it by Escape.
+    if (help.open) return;
     // A key that is held long must not press what takes the focus next.
     if (event.repeat && event.key === 'Enter' && event.target instanceof HTMLButtonElement) event.preventDefault();
     if (event.key === 'Escape') {
@@ -79,6 +85,7 @@ function start(viewer: Viewer): void {
       if (key === 'z' && !event.shiftKey && !store.state.job) session.undoFlip();
       return;
     }
+    if (key === '?') help.showModal();
     if (key === 'f') viewer.fit();
     // The box does nothing while it is disabled.
     if (key === 'b') element('#backs').click();
