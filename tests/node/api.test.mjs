@@ -1,4 +1,4 @@
-// What API.md promises, on the packed package in Node.
+// What the README and the types promise, on the packed package in Node.
 import assert from 'node:assert/strict';
 import { openAsBlob, readFileSync, writeFileSync } from 'node:fs';
 import { createServer } from 'node:http';
