@@ -60,6 +60,11 @@ fn peak_bytes_a_point() {
     let needle: Vec<f32> = (0..3_000_000)
         .map(|i| if i % 3 == 0 { 1e6 * random.signed() as f32 } else { random.signed() as f32 })
         .collect();
+    // Half of the points on each of two spheres: with a dense object in a wide scene, or round a scanner.
+    let wide = |times: f32| -> Vec<f32> {
+        let scaled = |(i, x): (usize, &f32)| if i / 3 % 2 == 0 { *x } else { times * x };
+        sphere.iter().enumerate().map(scaled).collect()
+    };
     // Input and normals are 12 bytes each; the input is given up before, unless signs need it.
     let (none, consistent, viewpoint) = (Orient::None, Orient::Consistent, Orient::Viewpoint([9.0; 3]));
     for (name, points, cell, orient, bound) in [
@@ -69,6 +74,8 @@ fn peak_bytes_a_point() {
         ("a stray point", &stray(3e6), Cell::Auto, none, 40),
         ("a stray point beyond all cubes", &stray(-1e30), Cell::Auto, none, 40),
         ("rough everywhere", &noisy, Cell::Auto, none, 60),
+        ("ten thousand times as dense", &wide(1e2), Cell::Auto, none, 150),
+        ("a million times as dense", &wide(1e3), Cell::Auto, none, 415),
         ("a needle", &needle, Cell::Scale(1.0), none, 74),
         ("as many cubes as points", &sphere, Cell::Scale(0.1), none, 92),
         ("far more cubes than points", &sphere, Cell::Size(1e-6), none, 130),
