@@ -1,26 +1,46 @@
-//! The middle of some values, without sorting them.
+//! The middle of some values, or what stands at another rank, without sorting them.
 
 /// The median of some values, none of them negative; 0 if there are none.
 pub(crate) fn median(values: &[f32]) -> f32 {
-    // Bit by bit: the bits of numbers that are not negative are in the order of the numbers.
-    let mut bits = 0u32;
-    for bit in (0..31).rev() {
-        let more = bits | 1 << bit;
-        if values.iter().filter(|value| value.to_bits() < more).count() <= values.len() / 2 {
-            bits = more;
+    // The bits of numbers that are not negative are in the order of the numbers.
+    f32::from_bits(ranked(values.iter().map(|value| value.to_bits()), values.len() / 2))
+}
+
+/// The number that would stand at `rank` if they were sorted; 0 if there are none. Bit by bit: in as many passes as the largest
+/// has bits, however many are alike. The library's selection takes the square of their number for such, as the modules have
+/// its small one.
+pub(crate) fn ranked(numbers: impl Iterator<Item = u32> + Clone, rank: usize) -> u32 {
+    let bits = u32::BITS - numbers.clone().max().unwrap_or(0).leading_zeros();
+    let mut found = 0;
+    for bit in (0..bits).rev() {
+        let more = found | 1 << bit;
+        if numbers.clone().filter(|&number| number < more).count() <= rank {
+            found = more;
         }
     }
-    if values.is_empty() { 0.0 } else { f32::from_bits(bits) }
+    found
 }
 
 #[cfg(test)]
 mod tests {
-    use super::median;
+    use super::*;
 
     #[test]
     fn medians_are_those_of_the_sorted_values() {
         let values: Vec<f32> = (0..101).map(|i| ((i * 37) % 101) as f32 * 1e-9).collect();
         assert_eq!(median(&values), 50.0 * 1e-9);
         assert_eq!((median(&[3.5]), median(&[])), (3.5, 0.0));
+    }
+
+    #[test]
+    fn ranks_are_those_of_the_sorted_numbers() {
+        for spread in [1, 2, 7, 1 << 27, u32::MAX] {
+            let numbers = (0..100u32).map(|i| i.wrapping_mul(0x9E37_79B9) % spread);
+            let mut sorted: Vec<u32> = numbers.clone().collect();
+            sorted.sort_unstable();
+            for rank in [0, 1, 50, 98, 99] {
+                assert_eq!(ranked(numbers.clone(), rank), sorted[rank], "{spread}, {rank}");
+            }
+        }
     }
 }

@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::grid::Grid;
 use crate::lattice::{BRICK, cube_place};
 use crate::lists::{filled, reserve};
+use crate::median::ranked;
 use crate::parallel::Gathering;
 use crate::progress::Stage;
 use crate::surroundings::STEPS;
@@ -315,31 +316,10 @@ fn box_round(bricks: &[IVec3], share: f64) -> (IVec3, IVec3) {
     let last = (bricks.len() - 1) as f64;
     let [low, high] = [share, 1.0 - share].map(|quantile| {
         let rank = (last * quantile).round() as usize;
-        IVec3::from_array([0, 1, 2].map(|axis| ranked(bricks, axis, rank)))
+        // No place is negative.
+        IVec3::from_array([0, 1, 2].map(|axis| ranked(bricks.iter().map(|brick| brick[axis] as u32), rank) as i32))
     });
     (BRICK * low, BRICK * (high - low + 1))
-}
-
-/// The coordinate that would stand at `rank` if those of the bricks were sorted: 31 passes over them at the most, however many
-/// are alike. The library's selection takes the square of their number for such, as the modules have its small one.
-fn ranked(bricks: &[IVec3], axis: usize, rank: usize) -> i32 {
-    let places = || bricks.iter().map(|brick| brick[axis]);
-    let (mut low, mut high) = places().fold((i32::MAX, 0), |(low, high), place| (low.min(place), high.max(place)));
-    if rank == 0 {
-        return low;
-    }
-    if rank + 1 == bricks.len() {
-        return high;
-    }
-    while low < high {
-        let middle = low + (high - low) / 2;
-        if places().filter(|&place| place <= middle).count() > rank {
-            high = middle;
-        } else {
-            low = middle + 1;
-        }
-    }
-    low
 }
 
 #[cfg(test)]
@@ -354,19 +334,6 @@ mod tests {
         assert_eq!(evidence[0], AIR * 0.9);
         assert!((-0.03 * AIR..0.0).contains(&evidence[1]), "{evidence:?}");
         assert_eq!(evidence[2], 0.0);
-    }
-
-    #[test]
-    fn ranks_are_those_of_the_sorted_places() {
-        for spread in [1, 2, 7, 1 << 27] {
-            let place = |i: u32| (i.wrapping_mul(0x9E37_79B9) % spread) as i32;
-            let bricks: Vec<IVec3> = (0..100).map(|i| IVec3::new(7, place(i), 0)).collect();
-            let mut sorted: Vec<i32> = (0..100).map(place).collect();
-            sorted.sort_unstable();
-            for rank in [0, 1, 50, 98, 99] {
-                assert_eq!([ranked(&bricks, 0, rank), ranked(&bricks, 1, rank)], [7, sorted[rank]]);
-            }
-        }
     }
 
     #[test]
