@@ -72,7 +72,7 @@ pub(crate) struct Density {
 }
 
 impl Density {
-    /// One pass over the points, more where the cloud is far smaller than its box.
+    /// One pass over the points; more where the cloud is far smaller than its box, or many points coincide.
     ///
     /// The mean of 1 / (points in the cube of a point), taken over all points, is the share of occupied cubes in points.
     /// So a few points chosen at random ("probes") tell it without bias, whatever the extent of the cloud: the cubes round

@@ -163,7 +163,8 @@ fn small_objects_far_apart() {
     }
 }
 
-/// Further than cubes reach, and than single precision tells points of one from each other: the larger one, at the origin, is whole.
+/// Further than cubes reach, and than single precision tells points of one from each other: the larger one, at the origin, is
+/// whole.
 #[test]
 fn bodies_a_million_radii_apart() {
     for (near, far, place) in [(1400, 600, [3e6, 0.0, 0.0]), (1400, 600, [1e8; 3]), (6000, 5000, [1e6; 3])] {
