@@ -2,6 +2,7 @@
 import { buffersOf } from './buffers.js';
 import type { StartWorker } from './protocol.js';
 
+// For the worker, which loads this file anyway: else that one too would come with a copy.
 export { buffersOf };
 
 /** How to start a worker: `direct` does it, in the one form that bundlers know and put their own address into. */
