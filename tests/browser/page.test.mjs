@@ -6,11 +6,10 @@ import { createServer } from 'node:http';
 import { join } from 'node:path';
 import { after, afterEach, before, test as nodeTest } from 'node:test';
 import { gunzipSync } from 'node:zlib';
-import { root } from '../../scripts/run.mjs';
+import { data } from '../node/data.mjs';
 import { parsePly } from '../node/ply.mjs';
 import { ARTEFACTS, backsShown, choose, colorsShown, drop, openBrowser, result, save, spherePly } from './browser.mjs';
 
-const SCANS = join(root, '..', 'shared', 'data', 'scans');
 let browser;
 let page;
 
@@ -1057,8 +1056,8 @@ test('what a depth camera saw stands upright', async () => {
   }
 });
 
-const AERIAL = join(SCANS, 'las_ahn3_cropped.ply.gz');
-test('a real aerial scan of 849 thousand points', { skip: !existsSync(AERIAL) && 'no ../shared/data' }, async () => {
+const AERIAL = join(data, 'scans', 'las_ahn3_cropped.ply.gz');
+test('a real aerial scan of 849 thousand points', { skip: !existsSync(AERIAL) && `no ${AERIAL}` }, async () => {
   page = await browser.openPage(browser.isolated);
   await choose(page, 'aerial.ply', gunzipSync(readFileSync(AERIAL)));
   const shown = await result(page, 'aerial.ply');

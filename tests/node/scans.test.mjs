@@ -1,16 +1,15 @@
-// Real and odd files, where they are there: in the folder that `BILINORMAL_DATA` names, or in `../shared/data` beside the
-// project. (None of them is part of the project.)
+// Every real and odd file, through the command line and the package, where the files are there (data.mjs).
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import { existsSync, readFileSync, readdirSync, writeFileSync } from 'node:fs';
-import { join, resolve } from 'node:path';
+import { join } from 'node:path';
 import { after, before, describe, test } from 'node:test';
 import { pathToFileURL } from 'node:url';
 import { gunzipSync } from 'node:zlib';
-import { installPacked, root } from './packed.mjs';
+import { data } from './data.mjs';
+import { installPacked } from './packed.mjs';
 import { parsePly, propertyOf, withoutNormals } from './ply.mjs';
 
-const data = resolve(root, process.env.BILINORMAL_DATA ?? '../shared/data');
 const filesIn = (folder) => readdirSync(join(data, folder)).filter((name) => /\.ply(\.gz)?$/.test(name));
 
 if (!existsSync(data)) {
