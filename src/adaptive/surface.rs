@@ -178,13 +178,14 @@ impl Window {
         if count >= QUADRIC_SAMPLES
             && let Some(fit) = self.quadratic(mean, [u, v, normal], [along, across], total)
         {
-            let [_, a, b, aa, ab, bb] = fit.coefficients.map(|c| c as f32);
+            let [a, b] = fit.slopes.map(|slope| slope as f32);
+            let [aa, ab, bb] = fit.bends.as_vec3().to_array();
             let slope = normal - a * u - b * v;
             let bend = Matrix::product(u, u).scaled(2.0 * aa);
             let bend = bend.plus(Matrix::product(u, v).scaled(2.0 * ab)).plus(Matrix::product(v, v).scaled(2.0 * bb));
             let scale = slope.length_recip();
             surface.quadric = Quadric {
-                centre: mean + normal * fit.coefficients[0] as f32,
+                centre: mean + normal * fit.height as f32,
                 height: 0.0,
                 slope: slope * scale,
                 bend: bend.scaled(-scale),
@@ -205,7 +206,7 @@ impl Window {
                 let is_noise = is_scattered && noise <= MORE * whole && noise * WIDE <= across;
                 let most = own * (1.0 + 3.0 * (2.0 / (count - 6.0)).sqrt()) + DETAIL * DETAIL;
                 surface.lacks_detail = between > most && !is_noise;
-                let [.., aa, ab, bb] = fit.coefficients;
+                let [aa, ab, bb] = fit.bends.to_array();
                 let is_plane = 4.0 * (aa * aa + bb * bb) + 2.0 * ab * ab <= PLANE && noise * CLEAR <= across;
                 let is_deep = noise >= DEEP && surface.shows(noise as f32);
                 surface.is_plane_in_noise = is_plane && is_deep && is_scattered;
@@ -215,7 +216,7 @@ impl Window {
             // Few samples more than coefficients leave the residual uncertain.
             let few = 1.0 / (count - 6.0);
             let variance = (noise + FIT * FIT) / points * thickness * (1.0 + 8.0 * few + 100.0 * few * few);
-            let [_, a, b, aa, ab, bb] = fit.variances;
+            let ([a, b], [aa, ab, bb]) = (fit.slope_variances, fit.bend_variances.to_array());
             surface.error = (variance * (a + b) + strip_error) as f32;
             surface.error_growth = (variance * (4.0 * aa + ab).max(4.0 * bb + ab)) as f32;
         } else {
@@ -236,8 +237,6 @@ impl Window {
             let (uu, uv, vv, wh) = (u * u, u * v, v * v, w * h);
             let (wuu, wuv, wvv) = (w * uu, w * uv, w * vv);
             [
-                w * u,
-                w * v,
                 wuu,
                 wuv,
                 wvv, //
@@ -250,7 +249,6 @@ impl Window {
                 wuu * vv,
                 wuv * vv,
                 wvv * vv, //
-                wh,
                 wh * u,
                 wh * v,
                 wh * uu,
@@ -260,42 +258,51 @@ impl Window {
             ]
         });
         let share = 1.0 / total;
-        let [u1, v1, uu, uv, vv, uuu, uuv, uvv, vvv, u4, u3v, uuvv, uv3, v4, h, hu, hv, huu, huv, hvv, hh] =
+        let [uu, uv, vv, uuu, uuv, uvv, vvv, u4, u3v, uuvv, uv3, v4, hu, hv, huu, huv, hvv, hh] =
             sums.map(|sum| sum * share);
-        let mut matrix = [
-            [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-            [u1, uu, 0.0, 0.0, 0.0, 0.0],
-            [v1, uv, vv, 0.0, 0.0, 0.0],
-            [uu, uuu, uuv, u4 + RIDGE, 0.0, 0.0],
-            [uv, uuv, uvv, u3v, uuvv + RIDGE, 0.0],
-            [vv, uvv, vvv, uuvv, uv3, v4 + RIDGE],
+        // The means of u, v and h are zero. So of the system the part of 1, u and v is solved by hand: `in_u` and `in_v` are
+        // what uu, uv and vv have in common with u and v, and the bends are told by the rest of them.
+        let determinant = uu * vv - uv * uv;
+        if determinant <= 0.0 {
+            return None;
+        }
+        let means = DVec3::new(uu, uv, vv);
+        let (with_u, with_v) = (DVec3::new(uuu, uuv, uvv), DVec3::new(uuv, uvv, vvv));
+        let in_u = (with_u * vv - with_v * uv) / determinant;
+        let in_v = (with_v * uu - with_u * uv) / determinant;
+        let rest = |squares: DVec3, i: usize| squares - means * means[i] - in_u * with_u[i] - in_v * with_v[i];
+        let rows = [
+            rest(DVec3::new(u4 + RIDGE, u3v, uuvv), 0),
+            rest(DVec3::new(u3v, uuvv + RIDGE, uv3), 1),
+            rest(DVec3::new(uuvv, uv3, v4 + RIDGE), 2),
         ];
-        let right = [h, hu, hv, huu, huv, hvv];
-        let (mut coefficients, mut variances) = solve(&mut matrix, right)?;
-        let explained: f64 = coefficients.iter().zip(right).map(|(c, r)| c * r).sum();
+        let heights = DVec3::new(huu, huv, hvv) - in_u * hu - in_v * hv;
+        let inverse = inverse(rows)?;
+        let product = |a: DVec3| DVec3::new(inverse[0].dot(a), inverse[1].dot(a), inverse[2].dot(a));
+        let bends = product(heights);
+        let slopes = [(hu * vv - hv * uv) / determinant, (hv * uu - hu * uv) / determinant];
+        let explained = slopes[0] * hu + slopes[1] * hv + bends.dot(heights);
         let residual = (hh - explained).max(0.0);
         // Noise alone would bend a plane, and most of all where that is continued: each bend is shrunk, the more the larger its
         // variance is. The other coefficients follow, as if along the principal axes `uu` and `vv` were 1 and `uv` 0: the
         // samples have some of that inside.
+        let variances = DVec3::new(inverse[0].x, inverse[1].y, inverse[2].z);
+        let squares = bends * bends;
         let variance = residual / (self.len() as f64 - 6.0);
-        let [aa, ab, bb] = [3, 4, 5].map(|i| {
-            let (c, square): (f64, f64) = (coefficients[i], coefficients[i] * coefficients[i]);
-            c * square / (square + variance * variances[i]).max(f64::MIN_POSITIVE)
-        });
-        coefficients = [
-            h - aa * uu - ab * uv - bb * vv,
-            hu - aa * uuu - ab * uuv - bb * uvv,
-            hv - aa * uuv - ab * uvv - bb * vvv,
-            aa,
-            ab,
-            bb,
-        ];
+        let bends = bends * squares / (squares + variance * variances).max(DVec3::splat(f64::MIN_POSITIVE));
         let [u, v] = unit.map(|unit| 1.0 / unit);
-        for (i, unit) in [1.0, u, v, u * u, u * v, v * v].into_iter().enumerate() {
-            coefficients[i] *= unit;
-            variances[i] *= unit * unit;
-        }
-        Some(Fit { coefficients, variances, residual })
+        let units = DVec3::new(u * u, u * v, v * v);
+        Some(Fit {
+            height: -bends.dot(means),
+            slopes: [(hu - bends.dot(with_u)) * u, (hv - bends.dot(with_v)) * v],
+            bends: bends * units,
+            slope_variances: [
+                (vv / determinant + in_u.dot(product(in_u))) * u * u,
+                (uu / determinant + in_v.dot(product(in_v))) * v * v,
+            ],
+            bend_variances: variances * units * units,
+            residual,
+        })
     }
 
     /// The mean variance, across the surface, of the points behind the samples; the variance of one of them over a plane of its
@@ -338,61 +345,24 @@ impl Window {
 /// Keeps curvature at zero where the samples do not tell it, as on two scan lines.
 const RIDGE: f64 = 1e-3;
 
-/// A quadratic function; each list in the order 1, u, v, uu, uv, vv.
+/// A quadratic function, and variances of its coefficients for samples of variance 1.
 struct Fit {
-    coefficients: [f64; 6],
-    /// Of the coefficients, for samples of variance 1.
-    variances: [f64; 6],
+    height: f64,
+    /// By u and v.
+    slopes: [f64; 2],
+    slope_variances: [f64; 2],
+    /// By uu, uv and vv.
+    bends: DVec3,
+    bend_variances: DVec3,
     /// The mean square of what is left.
     residual: f64,
 }
 
-/// Solves a positive definite system, of which the lower half is given, by Cholesky's method; also answers the diagonal
-/// of the inverse.
-#[optimize(size)]
-#[inline(never)]
-#[expect(clippy::needless_range_loop, reason = "rows and columns, as in the textbook")]
-fn solve(matrix: &mut [[f64; 6]; 6], mut right: [f64; 6]) -> Option<([f64; 6], [f64; 6])> {
-    let mut inverse = [[0.0; 6]; 6];
-    for i in 0..6 {
-        for j in 0..=i {
-            let mut sum = matrix[i][j];
-            for k in 0..j {
-                sum -= matrix[i][k] * matrix[j][k];
-            }
-            if j < i {
-                matrix[i][j] = sum * matrix[j][j];
-            } else if sum > 0.0 {
-                // The diagonal is kept as its reciprocal.
-                matrix[i][i] = 1.0 / sum.sqrt();
-            } else {
-                return None;
-            }
-        }
-        inverse[i][i] = matrix[i][i];
-        for j in 0..i {
-            let mut sum = 0.0;
-            for k in j..i {
-                sum += matrix[i][k] * inverse[k][j];
-            }
-            inverse[i][j] = -sum * matrix[i][i];
-        }
-    }
-    let mut half = [0.0; 6];
-    for i in 0..6 {
-        for k in 0..=i {
-            half[i] += inverse[i][k] * right[k];
-        }
-    }
-    let mut diagonal = [0.0; 6];
-    for j in 0..6 {
-        right[j] = 0.0;
-        for i in j..6 {
-            right[j] += inverse[i][j] * half[i];
-            diagonal[j] += inverse[i][j] * inverse[i][j];
-        }
-    }
-    Some((right, diagonal))
+/// The inverse of a symmetric matrix, if that is positive definite.
+fn inverse([a, b, c]: [DVec3; 3]) -> Option<[DVec3; 3]> {
+    let (x, y, z) = (b.cross(c), c.cross(a), a.cross(b));
+    let determinant = a.dot(x);
+    (determinant > 0.0).then(|| [x, y, z].map(|column| column / determinant))
 }
 
 /// The two other eigenvectors of a covariance, and its eigenvalues, the largest first.
