@@ -2,7 +2,7 @@
 
 use super::WHAT;
 use super::around::Around;
-use super::samples::{Sample, Samples, Window, Writing};
+use super::samples::{Sample, Window};
 use super::surface::Surface;
 use crate::error::Error;
 use crate::grid::{Grid, Placed, octants};
@@ -20,7 +20,7 @@ pub(super) struct Level {
     pub lattice: Lattice,
     pub grid: Grid,
     /// Cube by cube.
-    samples: Samples,
+    samples: Vec<Sample>,
     /// For each cube its last sample, plus one.
     sample_end: Vec<u32>,
     pub surfaces: Vec<Surface>,
@@ -56,7 +56,7 @@ impl Level {
             total += *end;
             *end = total;
         }
-        let (samples, surfaces, roles) = (Samples::default(), Vec::new(), Vec::new());
+        let (samples, surfaces, roles) = (Vec::new(), Vec::new(), Vec::new());
         Ok(Self { lattice: source.lattice, grid, samples, sample_end, surfaces, roles })
     }
 
@@ -65,7 +65,7 @@ impl Level {
     #[inline(never)]
     pub fn sample(&mut self, wholes: Option<&[Sample]>, stage: &Stage) -> Result<(), Error> {
         let (grid, sample_end) = (&self.grid, &self.sample_end);
-        let samples = Writing::new(sample_end.last().map_or(0, |&end| end as usize))?;
+        let samples = Filling::new(sample_end.last().map_or(0, |&end| end as usize), WHAT)?;
         grid.each_cube(stage, &|_, cube, bit| {
             let start = range(sample_end, cube).start;
             let centre = cube_centre(bit);
@@ -90,7 +90,7 @@ impl Level {
         let cubes = self.grid.cubes();
         let (positions, wholes) = (Filling::new(cubes, WHAT)?, Filling::new(cubes, WHAT)?);
         self.grid.each_cube(&stage.part(0.0..0.3), &|_, cube, bit| {
-            let whole = Sample::of(range(&self.sample_end, cube).map(|sample| self.samples.get(sample)));
+            let whole = Sample::of(self.samples[range(&self.sample_end, cube)].iter().copied());
             // SAFETY: once for each cube.
             unsafe {
                 positions.write(cube, cube_centre(bit) + whole.place);
@@ -194,7 +194,7 @@ impl Level {
 
     /// Gives up what surfaces were fitted to.
     fn release_samples(&mut self) {
-        (self.samples, self.sample_end) = (Samples::default(), Vec::new());
+        (self.samples, self.sample_end) = (Vec::new(), Vec::new());
     }
 
     /// What a cube is here for.
@@ -239,8 +239,9 @@ impl Level {
                     around.near(grid, brick, bit, 1, &mut near);
                     for &(step, near) in &near {
                         let shares = 1.0 - (1.0 - NEXT) * step.abs();
-                        window.add(&self.samples, range(&self.sample_end, near), step, shares.element_product());
+                        window.add(&self.samples[range(&self.sample_end, near)], step, shares.element_product());
                     }
+                    window.end();
                 }
                 // SAFETY: once for each cube.
                 unsafe { surfaces.write(cube, window.fit()) };

@@ -1,15 +1,13 @@
 //! What surfaces are fitted to: points, or the centroids of several with their covariance.
 
-use super::WHAT;
 use super::matrix::Matrix;
-use crate::error::Error;
 use crate::lanes::{load, transposed};
-use crate::parallel::Filling;
+use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3, Vec4};
-use std::ops::Range;
 
 /// One sample.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
 pub(super) struct Sample {
     /// The centroid of its points, against the centre of its cube, in edges.
     pub place: Vec3,
@@ -56,72 +54,18 @@ const NUMBERS: usize = 10;
 /// Which of them are the points.
 const POINTS: usize = 3;
 
-/// Many samples, number by number, so that four are read at once.
-#[derive(Default)]
-pub(super) struct Samples {
-    numbers: Vec<f32>,
-    /// What lies between two numbers of a sample.
-    stride: usize,
-}
-
-/// Four are read from the last one too.
-const BEYOND: usize = 3;
-
-impl Samples {
-    /// One of them.
-    pub fn get(&self, sample: usize) -> Sample {
-        let number = |i: usize| self.numbers[i * self.stride + sample];
-        let vector = |i: usize| Vec3::new(number(i), number(i + 1), number(i + 2));
-        Sample { place: vector(0), points: number(POINTS), spread: Matrix { diagonal: vector(4), off: vector(7) } }
-    }
-}
-
-/// [`Samples`] while they are written, in any order.
-pub(super) struct Writing {
-    numbers: Filling<f32>,
-    count: usize,
-}
-
-impl Writing {
-    pub fn new(count: usize) -> Result<Self, Error> {
-        Ok(Self { numbers: Filling::new(NUMBERS * (count + BEYOND), WHAT)?, count })
-    }
-
-    /// # Safety
-    /// No other call, on any thread, may write the same sample.
-    #[inline]
-    pub unsafe fn write(&self, number: usize, sample: Sample) {
-        let Sample { place: p, points, spread: Matrix { diagonal: d, off: o } } = sample;
-        for (i, value) in [p.x, p.y, p.z, points, d.x, d.y, d.z, o.x, o.y, o.z].into_iter().enumerate() {
-            // SAFETY: by the caller's promise.
-            unsafe { self.numbers.write(i * (self.count + BEYOND) + number, value) };
-        }
-    }
-
-    /// # Safety
-    /// All samples must have been written.
-    pub unsafe fn complete(self) -> Samples {
-        let nothing = Sample { points: 0.0, ..Sample::point(Vec3::ZERO) };
-        // SAFETY: the last are written here, the others by the caller's promise.
-        unsafe {
-            (self.count..self.count + BEYOND).for_each(|number| self.write(number, nothing));
-            Samples { numbers: self.numbers.complete(), stride: self.count + BEYOND }
-        }
-    }
-}
-
 /// The samples of a neighbourhood, against the centre of its cube, each with its weight in the sums.
 ///
 /// Aligned, so that no four lie across two cache lines: it made a surface 20 % slower whenever the compiler placed it so.
 #[repr(C, align(16))]
 pub(super) struct Window {
-    /// As in [`Samples`], and the weights as an eleventh number.
+    /// Number by number, so that four samples are read at once, and the weights as an eleventh number.
     numbers: [[f32; ROOM]; NUMBERS + 1],
     count: usize,
 }
 
-/// Eight octants in each of 27 cubes, and what is written beyond.
-const ROOM: usize = 8 * 27 + BEYOND + 1;
+/// Eight octants in each of 27 cubes, in fours.
+const ROOM: usize = 8 * 27;
 
 /// Which of a window's numbers is the weight.
 const WEIGHT: usize = NUMBERS;
@@ -146,23 +90,21 @@ impl Window {
 
     /// Adds the samples of a cube `step` away, each of them counted `share` times.
     #[inline(never)]
-    pub fn add(&mut self, samples: &Samples, range: Range<usize>, step: Vec3, share: f32) {
-        let shifts = [step.x, step.y, step.z];
-        // Four at a time; what is written too much is overwritten by the next.
-        for i in (0..range.len()).step_by(4) {
-            let (from, to) = (range.start + i, self.count + i);
-            for number in 0..NUMBERS {
-                let four = load(&samples.numbers[number * samples.stride + from..]);
-                let shift = shifts.get(number).copied().unwrap_or(0.0);
-                (four + shift).write_to_slice(&mut self.numbers[number][to..]);
-            }
-            let points = load(&samples.numbers[POINTS * samples.stride + from..]);
-            (points * share).write_to_slice(&mut self.numbers[WEIGHT][to..]);
+    pub fn add(&mut self, samples: &[Sample], step: Vec3, share: f32) {
+        assert!(self.count + samples.len() <= ROOM);
+        for (at, sample) in (self.count..).zip(samples) {
+            let Sample { place: p, points, spread: Matrix { diagonal: d, off: o } } = *sample;
+            let weight = share * points;
+            let numbers = [p.x + step.x, p.y + step.y, p.z + step.z, points, d.x, d.y, d.z, o.x, o.y, o.z, weight];
+            (0..NUMBERS + 1).for_each(|i| self.numbers[i][at] = numbers[i]);
         }
-        self.count += range.len();
-        // The lanes beyond the last sample weigh nothing.
+        self.count += samples.len();
+    }
+
+    /// What the lanes beyond the last sample hold weighs nothing.
+    pub fn end(&mut self) {
         for number in [POINTS, WEIGHT] {
-            self.numbers[number][self.count..self.count + BEYOND].fill(0.0);
+            self.numbers[number][self.count..self.count.next_multiple_of(4)].fill(0.0);
         }
     }
 

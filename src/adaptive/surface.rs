@@ -386,7 +386,7 @@ fn principal(covariance: &Symmetric, normal: DVec3) -> (Vec3, Vec3, [f64; 3]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::samples::{Sample, Window, Writing};
+    use super::super::samples::{Sample, Window};
     use super::*;
 
     /// A window of points, each a sample.
@@ -395,15 +395,9 @@ mod tests {
     }
 
     fn window_of(list: &[Sample]) -> Window {
-        let samples = Writing::new(list.len()).unwrap();
-        for (i, sample) in list.iter().enumerate() {
-            // SAFETY: each once.
-            unsafe { samples.write(i, *sample) };
-        }
-        // SAFETY: all were written.
-        let samples = unsafe { samples.complete() };
         let mut window = Window::new();
-        window.add(&samples, 0..list.len(), Vec3::ZERO, 1.0);
+        window.add(list, Vec3::ZERO, 1.0);
+        window.end();
         window
     }
 
