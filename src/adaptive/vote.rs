@@ -307,6 +307,12 @@ struct Best {
     fall: f32,
 }
 
+impl Best {
+    /// Where nobody votes.
+    const NONE: Self =
+        Self { weight: -1.0, normal: Vec3::ZERO, height: 0.0, centre: Vec3::ZERO, error: 0.0, fall: 0.0 };
+}
+
 /// The surfaces that vote in a cube.
 #[derive(Default)]
 struct Ballot {
@@ -331,23 +337,28 @@ impl Ballot {
     #[inline(never)]
     fn ask(&mut self, point: Vec3) -> Best {
         self.votes.clear();
-        // Lane by lane: the weight, and what else is to be told.
-        let mut most = [Vec4::ZERO; 10];
-        most[0] = Vec4::NEG_ONE;
-        for voters in &self.voters {
+        // Lane by lane: the weight, and the number of the four.
+        let (mut most, mut place) = (Vec4::NEG_ONE, Vec4::ZERO);
+        for (i, voters) in self.voters.iter().enumerate() {
             let votes = voters.speak(point);
-            let ([x, y, z], [a, b, c]) = (votes.normal, voters.centre);
-            let is_more = votes.weight.cmpgt(most[0]);
-            for (most, new) in
-                most.iter_mut().zip([votes.weight, x, y, z, votes.height, a, b, c, voters.error, voters.fall])
-            {
-                *most = Vec4::select(is_more, new, *most);
-            }
+            let is_more = votes.weight.cmpgt(most);
+            most = Vec4::select(is_more, votes.weight, most);
+            place = Vec4::select(is_more, Vec4::splat(i as f32), place);
             self.votes.push(votes);
         }
-        let lane = most[0].max_position();
-        let [weight, x, y, z, height, a, b, c, error, fall] = most.map(|lanes| lanes[lane]);
-        Best { weight, normal: Vec3::new(x, y, z), height, centre: Vec3::new(a, b, c), error, fall }
+        let lane = most.max_position();
+        let (Some(votes), Some(voters)) = (self.votes.get(place[lane] as usize), self.voters.get(place[lane] as usize)) else {
+            return Best::NONE;
+        };
+        let vector = |lanes: [Vec4; 3]| Vec3::from_array(lanes.map(|lanes| lanes[lane]));
+        Best {
+            weight: votes.weight[lane],
+            normal: vector(votes.normal),
+            height: votes.height[lane],
+            centre: vector(voters.centre),
+            error: voters.error[lane],
+            fall: voters.fall[lane],
+        }
     }
 
     /// One linear function for all points of a cube, if about its centroid all voters agree within so many radians, and the
