@@ -13,11 +13,33 @@ pub(super) struct Around {
     occupied: [u64; 8],
     cubes: [u32; 512],
     brick: usize,
+    list: [Near; 125],
 }
+
+/// A cube near another one.
+#[derive(Clone, Copy)]
+pub(super) struct Near {
+    /// What lies between the two, in edges.
+    pub step: Vec3,
+    /// Its number.
+    pub cube: u32,
+}
+
+/// What lies between the first of 8x8 places and each of them.
+const STEPS: [Vec3; 64] = {
+    let mut steps = [Vec3::ZERO; 64];
+    let mut i = 0;
+    while i < 64 {
+        steps[i] = Vec3::new((i % 8) as f32, (i / 8) as f32, 0.0);
+        i += 1;
+    }
+    steps
+};
 
 impl Around {
     pub fn new() -> Self {
-        Self { occupied: [0; 8], cubes: [0; 512], brick: usize::MAX }
+        let list = [Near { step: Vec3::ZERO, cube: 0 }; 125];
+        Self { occupied: [0; 8], cubes: [0; 512], brick: usize::MAX, list }
     }
 
     /// Looks up the 27 bricks around and in place of brick `brick`.
@@ -36,23 +58,26 @@ impl Around {
         }
     }
 
-    /// Lists the occupied cubes at most `reach` (1 or 2) away from the cube with bit `bit` of a brick: what lies between
-    /// the two, in edges, and the number of the other. In the order of their places.
-    pub fn near(&mut self, grid: &Grid, brick: usize, bit: u32, reach: u32, list: &mut Vec<(Vec3, usize)>) {
+    /// The occupied cubes at most `reach` (1 or 2) away from the cube with bit `bit` of a brick, in the order of their
+    /// places.
+    pub fn near(&mut self, grid: &Grid, brick: usize, bit: u32, reach: u32) -> &[Near] {
         if self.brick != brick {
             self.look(grid, brick);
         }
-        list.clear();
         let corner = UVec3::new(bit & 3, bit >> 2 & 3, bit >> 4) + 2 - reach;
         let shift = corner.x + 8 * corner.y;
         let rows: u64 = if reach == 1 { 0x0007_0707 } else { 0x001F_1F1F_1F1F };
+        let mut count = 0;
         for z in 0..=2 * reach {
             let first = 64 * (corner.z + z);
+            let row = Vec3::new(0.0, 0.0, z as f32) - reach as f32;
             for near in set_bits(self.occupied[first as usize / 64] >> shift & rows) {
-                let step = UVec3::new(near & 7, near >> 3, z).as_vec3() - reach as f32;
-                list.push((step, self.cubes[(first + shift + near) as usize] as usize));
+                let cube = self.cubes[(first + shift + near) as usize % 512];
+                self.list[count] = Near { step: STEPS[near as usize] + row, cube };
+                count += 1;
             }
         }
+        &self.list[..count]
     }
 
     fn place(bit: u32) -> usize {
@@ -85,17 +110,17 @@ mod tests {
             .flat_map(|block| grid.cubes_in(block))
             .map(|(brick, cube, bit)| (brick, cube, bit, 4 * grid.bricks.places[brick] + cube_centre(bit).as_ivec3()))
             .collect();
-        let (mut around, mut near) = (Around::new(), Vec::new());
+        let mut around = Around::new();
         for &(brick, _, bit, place) in &all {
             for reach in [1, 2] {
-                around.near(&grid, brick, bit, reach, &mut near);
+                let near = around.near(&grid, brick, bit, reach);
                 let mut expected: Vec<(IVec3, usize)> = all
                     .iter()
                     .map(|&(_, cube, _, other)| (other - place, cube))
                     .filter(|(step, _)| step.abs().max_element() <= reach as i32)
                     .collect();
                 expected.sort_by_key(|(step, _)| (step.z, step.y, step.x));
-                let found: Vec<(IVec3, usize)> = near.iter().map(|&(step, cube)| (step.as_ivec3(), cube)).collect();
+                let found: Vec<(IVec3, usize)> = near.iter().map(|near| (near.step.as_ivec3(), near.cube as usize)).collect();
                 assert_eq!(found, expected);
             }
         }

@@ -1,7 +1,7 @@
 //! A grid of cubes, and the surface of every cube.
 
 use super::WHAT;
-use super::around::Around;
+use super::around::{Around, Near};
 use super::samples::{Sample, Window};
 use super::surface::Surface;
 use crate::error::Error;
@@ -120,10 +120,10 @@ impl Level {
         reserve(&mut is_near, grid.cubes(), WHAT)?;
         is_near.resize_with(grid.cubes(), AtomicBool::default);
         stage.part(0.0..0.1).run(grid.blocks.len(), &|block| {
-            let (mut around, mut near) = (Around::new(), Vec::new());
+            let mut around = Around::new();
             for (brick, _, bit) in grid.cubes_in(block).filter(|&(_, cube, _)| is_divided(cube)) {
-                around.near(grid, brick, bit, 1, &mut near);
-                near.iter().for_each(|&(_, cube)| is_near[cube].store(true, Relaxed));
+                let near = around.near(grid, brick, bit, 1);
+                near.iter().for_each(|near| is_near[near.cube as usize].store(true, Relaxed));
             }
         })?;
         let near_of = |brick: usize| {
@@ -232,14 +232,14 @@ impl Level {
         let grid = &self.grid;
         let surfaces = Filling::new(self.grid.cubes(), WHAT)?;
         stage.run(grid.blocks.len(), &|block| {
-            let (mut around, mut near, mut window) = (Around::new(), Vec::new(), Window::new());
+            let (mut around, mut window) = (Around::new(), Window::new());
             for (brick, cube, bit) in grid.cubes_in(block) {
                 window.clear();
                 if self.role(cube) != Role::Settled {
-                    around.near(grid, brick, bit, 1, &mut near);
-                    for &(step, near) in &near {
+                    for &Near { step, cube } in around.near(grid, brick, bit, 1) {
                         let shares = 1.0 - (1.0 - NEXT) * step.abs();
-                        window.add(&self.samples[range(&self.sample_end, near)], step, shares.element_product());
+                        let samples = &self.samples[range(&self.sample_end, cube as usize)];
+                        window.add(samples, step, shares.element_product());
                     }
                     window.end();
                 }

@@ -1,6 +1,6 @@
 //! The normals of the points, from the surfaces of the cubes round them.
 
-use super::around::Around;
+use super::around::{Around, Near};
 use super::choose::Chosen;
 use super::level::{Level, Role};
 use super::matrix::{dot_lanes, times_lanes};
@@ -99,7 +99,6 @@ struct Task<'a> {
     vote: &'a Vote<'a>,
     writer: Writer<'a>,
     around: Around,
-    near: Vec<(Vec3, usize)>,
     ballot: Ballot,
     resolved: u64,
 }
@@ -107,7 +106,7 @@ struct Task<'a> {
 impl<'a> Task<'a> {
     fn new(vote: &'a Vote<'a>) -> Self {
         let writer = vote.normals.writer();
-        Self { vote, writer, around: Around::new(), near: Vec::new(), ballot: Ballot::default(), resolved: 0 }
+        Self { vote, writer, around: Around::new(), ballot: Ballot::default(), resolved: 0 }
     }
 
     /// Finds the normals of the points of a cube, unless it is to be divided: answers what its parts would be for, and only
@@ -120,7 +119,7 @@ impl<'a> Task<'a> {
         let can_divide = division < DIVISIONS && surface.points >= DIVIDED_POINTS;
         let mut smooth = None;
         if own.is_some() {
-            self.around.near(&level.grid, brick, bit, 1, &mut self.near);
+            let near = self.around.near(&level.grid, brick, bit, 1);
             // Whether noise decides: the cube rests on a larger neighbourhood than the smallest, and its points lie off the
             // surface within the samples too. The sides of a thin wall are samples of their own. Waves shorter than a cube of
             // the base look the same, so that is divided once all the same; and where the smallest neighbourhood does not
@@ -128,20 +127,20 @@ impl<'a> Task<'a> {
             let is_noisy = division > 0 && own.doublings > 0 && surface.error <= UNSURE && surface.shows(own.noise);
             let is_unsure = own.error > UNSURE;
             if !(can_divide && (is_unsure || !is_noisy && surface.lacks_detail)) {
-                self.ballot.invite(&self.near, chosen, f32::INFINITY);
+                self.ballot.invite(near, chosen, f32::INFINITY);
                 let tolerance = if is_noisy { SMOOTH_IN_NOISE } else { SMOOTH };
                 smooth = self.ballot.smooth(own.quadric.centre, tolerance);
             }
         }
         if smooth.is_none() {
-            self.around.near(&level.grid, brick, bit, 2, &mut self.near);
+            let near = self.around.near(&level.grid, brick, bit, 2);
             // Else noise hides what the parts could tell, also of an edge in this very cube.
-            let in_noise = self.near.iter().filter(|(_, cube)| level.surfaces[*cube].is_plane_in_noise).count();
-            if can_divide && IN_NOISE * in_noise < self.near.len() {
+            let in_noise = near.iter().filter(|near| level.surfaces[near.cube as usize].is_plane_in_noise).count();
+            if can_divide && IN_NOISE * in_noise < near.len() {
                 return Role::Wanted;
             }
-            let noises = self.near.iter().map(|(_, cube)| chosen[*cube].flat_noise);
-            self.ballot.invite(&self.near, chosen, quartile(noises));
+            let noises = near.iter().map(|near| chosen[near.cube as usize].flat_noise);
+            self.ballot.invite(near, chosen, quartile(noises));
         }
         let placed = level.points(cube);
         let centre = cube_centre(bit);
@@ -324,9 +323,10 @@ struct Ballot {
 impl Ballot {
     /// Asks the surfaces of some cubes, and trusts those less that are noisier than `reference`.
     #[inline(never)]
-    fn invite(&mut self, near: &[(Vec3, usize)], chosen: &[Chosen], reference: f32) {
+    fn invite(&mut self, near: &[Near], chosen: &[Chosen], reference: f32) {
         self.voters.clear();
-        let mut all = near.iter().map(|&(step, cube)| (step, &chosen[cube])).filter(|(_, other)| other.is_some());
+        let mut all =
+            near.iter().map(|near| (near.step, &chosen[near.cube as usize])).filter(|(_, other)| other.is_some());
         while let Some(first) = all.next() {
             let mut next = || all.next().unwrap_or((Vec3::ZERO, &Chosen::NONE));
             self.voters.push(Voters::of([first, next(), next(), next()], reference));
@@ -457,7 +457,7 @@ mod tests {
         let faces = [face(-0.5 * Vec3::X, Vec3::Z), face(-0.5 * Vec3::Z, Vec3::X)];
         for order in [[0, 1], [1, 0]] {
             let mut ballot = Ballot::default();
-            ballot.invite(&order.map(|cube| (Vec3::ZERO, cube)), &faces, f32::INFINITY);
+            ballot.invite(&order.map(|cube| Near { step: Vec3::ZERO, cube }), &faces, f32::INFINITY);
             let beyond_the_top = ballot.vote(Vec3::new(0.03, 0.0, -0.02)).normalize();
             assert!(beyond_the_top.x > 0.9, "{beyond_the_top}");
             let beyond_the_side = ballot.vote(Vec3::new(-0.02, 0.0, 0.03)).normalize();
