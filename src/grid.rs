@@ -331,9 +331,10 @@ fn sort_brick(points: &[Placed], sorted: &mut [Placed], next: &mut [u32; 8 * 64]
     mask
 }
 
-/// Runs of bricks that hold some ten thousand points each: the tasks of the later stages.
+/// Runs of bricks that hold some four thousand points each: the tasks of the later stages. Of what is divided there are often
+/// no more than a hundred thousand at a time, and the threads are to end together.
 fn blocks(first_point: &[u32]) -> Vec<Range<usize>> {
-    const POINTS: u32 = 1 << 14;
+    const POINTS: u32 = 1 << 12;
     const BRICKS: usize = 1 << 10;
     let count = first_point.len() - 1;
     let mut blocks = Vec::new();

@@ -15,7 +15,7 @@ use std::sync::{Mutex, PoisonError};
 pub(crate) const SAMPLE: usize = 4096;
 
 /// How many points a task takes: enough to be worth a task, few enough to stay in a cache.
-pub(crate) const CHUNK: usize = 1 << 14;
+pub(crate) const CHUNK: usize = 1 << 13;
 
 /// A cloud as the estimator takes it: single-precision positions relative to a double-precision origin.
 ///
