@@ -120,7 +120,8 @@ mod tests {
                     .filter(|(step, _)| step.abs().max_element() <= reach as i32)
                     .collect();
                 expected.sort_by_key(|(step, _)| (step.z, step.y, step.x));
-                let found: Vec<(IVec3, usize)> = near.iter().map(|near| (near.step.as_ivec3(), near.cube as usize)).collect();
+                let found: Vec<(IVec3, usize)> =
+                    near.iter().map(|near| (near.step.as_ivec3(), near.cube as usize)).collect();
                 assert_eq!(found, expected);
             }
         }

@@ -347,7 +347,8 @@ impl Ballot {
             self.votes.push(votes);
         }
         let lane = most.max_position();
-        let (Some(votes), Some(voters)) = (self.votes.get(place[lane] as usize), self.voters.get(place[lane] as usize)) else {
+        let (Some(votes), Some(voters)) = (self.votes.get(place[lane] as usize), self.voters.get(place[lane] as usize))
+        else {
             return Best::NONE;
         };
         let vector = |lanes: [Vec4; 3]| Vec3::from_array(lanes.map(|lanes| lanes[lane]));
