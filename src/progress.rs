@@ -61,7 +61,7 @@ pub(crate) struct Stage<'a> {
 
 impl Stage<'_> {
     /// Runs `work` for each number below `count`, in parallel. Between batches it tells the observer and lets it stop
-    /// the call: with tasks of some ten thousand points, some twenty times a second. Threads wait for each other
+    /// the call: with tasks of some thousand points, some twenty times a second. Threads wait for each other
     /// at the end of a batch, so smaller ones cost time.
     pub fn run(&self, count: usize, work: &(dyn Fn(usize) + Sync)) -> Result<(), Error> {
         self.run_in(64, count, work)

@@ -7,9 +7,11 @@ use super::looks::{Look, Looks};
 use super::patches::{Patches, signed};
 use crate::error::Error;
 use crate::lists::{filled, reserve, starts};
+use crate::parallel::{self, Filling};
 use crate::power::exp2;
 use crate::progress::Stage;
 use std::iter;
+use std::ops::Range;
 
 /// Groups of patches that agree, groups of such groups, and so on, up to the components, which at most touch each other.
 pub(super) struct Groups {
@@ -45,12 +47,11 @@ impl Groups {
         let mut sizes = filled(1, count, GRAPH)?;
         own.iter_mut().zip(sights.evidence(patches)).for_each(|(own, evidence)| *own = evidence);
         component.iter_mut().zip(0..).for_each(|(component, one)| *component = one);
-        for _ in 0..ROUNDS {
-            let done = |groups: usize| 1.0 - groups as f64 / count.max(1) as f64;
-            stage.tell(done(own.len()))?;
-            let Some(Merging { group, flipped, groups }) = merge(&links, &own, &sizes)? else { break };
-            stage.tell(done((own.len() + groups) / 2))?;
-            let merged = gather(&links, &group, &flipped, groups)?;
+        for round in 0..ROUNDS {
+            let stage = stage.part(rest(round));
+            let merging = merge(&links, &own, &sizes, &stage.part(0.0..0.5))?;
+            let Some(Merging { group, flipped, groups }) = merging else { break };
+            let merged = gather(&links, &group, &flipped, groups, &stage.part(0.5..1.0))?;
             let mut sums = filled(0.0, groups, GRAPH)?;
             for (one, &group) in group.iter().enumerate() {
                 sums[group as usize] += signed(flipped[one], own[one]);
@@ -94,7 +95,7 @@ impl Groups {
                 *flipped = bold;
             }
         }
-        mend(links, None, &|one| own[one], &mut flipped)?;
+        mend(links, None, &|one| own[one], &mut flipped, &stage.part(0.8..1.0))?;
         Ok(flipped)
     }
 
@@ -104,12 +105,12 @@ impl Groups {
         let mut links = self.across_the_air(looks, sights)?;
         let mut levels = Vec::new();
         reserve(&mut levels, self.levels.len(), GRAPH)?;
-        for Level { group, flipped, .. } in &self.levels {
+        for (number, Level { group, flipped, .. }) in self.levels.iter().enumerate() {
             let groups = group.iter().max().map_or(0, |&last| last as usize + 1);
-            let merged = gather(&links, group, flipped, groups)?;
+            let merged = gather(&links, group, flipped, groups, &stage.part(0.0..0.5).part(rest(number)))?;
             levels.push(std::mem::replace(&mut links, merged));
         }
-        self.descend(1.0, Some(&levels), stage)
+        self.descend(1.0, Some(&levels), &stage.part(0.5..1.0))
     }
 
     /// What the looks of the patches of each component at each other say, but for those at the back of what itself sees the open
@@ -130,8 +131,6 @@ impl Groups {
         let mut flipped = filled(false, self.own.len(), GRAPH)?;
         flipped.iter_mut().zip(&self.own).for_each(|(flipped, own)| *flipped = *own < 0.0);
         for (number, Level { links, own, sizes, group, flipped: within }) in self.levels.iter().enumerate().rev() {
-            // Each level has about twice as many groups as the next.
-            stage.tell(exp2(-(number as f64)))?;
             let mut finer = filled(false, group.len(), GRAPH)?;
             for ((finer, &group), within) in finer.iter_mut().zip(group).zip(within) {
                 *finer = within ^ flipped[group as usize];
@@ -139,10 +138,22 @@ impl Groups {
             flipped = finer;
             let rim = |one: usize| if across.is_some() { (sizes[one] as f32).sqrt().recip() } else { 1.0 };
             let share = |one: usize| trust * own[one] * rim(one);
-            mend(links, across.map(|across| &across[number]), &share, &mut flipped)?;
+            let Range { start, end } = rest(number);
+            mend(
+                links,
+                across.map(|across| &across[number]),
+                &share,
+                &mut flipped,
+                &stage.part(1.0 - end..1.0 - start),
+            )?;
         }
         Ok(flipped)
     }
+}
+
+/// Of a stage that goes through the levels from the first on, the part of one: each has about twice as many groups as the next.
+fn rest(number: usize) -> Range<f64> {
+    1.0 - exp2(-(number as f64))..1.0 - exp2(-(number as f64 + 1.0))
 }
 
 /// Two groups only touch, and stay two surfaces, if the evidence between them is at most this times (root of n, less 1), n
@@ -181,15 +192,16 @@ struct Merging {
 
 /// Merges each with the one that it has the [`strongest`] evidence for or against. `None` when no two are linked any more.
 #[inline(never)]
-fn merge(links: &Links, own: &[f32], sizes: &[u32]) -> Result<Option<Merging>, Error> {
+fn merge(links: &Links, own: &[f32], sizes: &[u32], stage: &Stage) -> Result<Option<Merging>, Error> {
     let count = links.len();
     // Towards the root of the group, and whether flipped against it.
     let mut parents = filled((0u32, false), count, GRAPH)?;
     parents.iter_mut().zip(0..).for_each(|(parent, one)| parent.0 = one);
     let mut is_merged = false;
-    for at_any_price in [false, true] {
-        for one in 0..count {
-            let Some(best) = strongest(links, own, sizes, one, at_any_price) else { continue };
+    for (at_any_price, part) in [(false, 0.0..0.5), (true, 0.5..1.0)] {
+        let best = each(count, &stage.part(part), |one| strongest(links, own, sizes, one, at_any_price))?;
+        for (one, best) in best.into_iter().enumerate() {
+            let Some(best) = best else { continue };
             let ((a, a_flipped), (b, b_flipped)) = (root(&mut parents, one as u32), root(&mut parents, best.to));
             if a != b {
                 parents[a.max(b) as usize] = (a.min(b), a_flipped ^ b_flipped ^ (best.evidence < 0.0));
@@ -250,9 +262,23 @@ fn root(parents: &mut [(u32, bool)], mut one: u32) -> (u32, bool) {
     }
 }
 
+/// What `of_one` says of each, in parallel.
+fn each<T: Copy + Send>(count: usize, stage: &Stage, of_one: impl Fn(usize) -> T + Sync) -> Result<Vec<T>, Error> {
+    const PIECE: usize = 1 << 10;
+    let all = Filling::new(count, GRAPH)?;
+    stage.run(count.div_ceil(PIECE), &|i| {
+        for one in parallel::piece(count, PIECE, i) {
+            // SAFETY: each belongs to one piece.
+            unsafe { all.write(one, of_one(one)) };
+        }
+    })?;
+    // SAFETY: the pieces hold all.
+    Ok(unsafe { all.complete() })
+}
+
 /// The links between groups.
 #[inline(never)]
-fn gather(links: &Links, group: &[u32], flipped: &[bool], groups: usize) -> Result<Links, Error> {
+fn gather(links: &Links, group: &[u32], flipped: &[bool], groups: usize, stage: &Stage) -> Result<Links, Error> {
     let mut counts = filled(0u32, groups, GRAPH)?;
     group.iter().for_each(|&group| counts[group as usize] += 1);
     // The members of each group, one after the other.
@@ -262,55 +288,70 @@ fn gather(links: &Links, group: &[u32], flipped: &[bool], groups: usize) -> Resu
         counts[group as usize] -= 1;
         members[first[group as usize] + counts[group as usize] as usize] = one as u32;
     }
-    let mut merged = Links::with_capacity(groups)?;
-    // Where the link to a group stands among those of one.
-    let mut places = filled(usize::MAX, groups, GRAPH)?;
-    for one in 0..groups {
-        let own = &members[first[one]..first[one + 1]];
-        let from = |member: u32| links.from(member as usize);
-        merged.push(own.iter().map(|&member| from(member).len()).sum(), |list| {
-            let start = list.len();
-            for &member in own {
-                for link in from(member) {
-                    let to = group[link.to as usize];
-                    if to as usize == one {
-                        continue;
+    // A piece for each thread: those of a group are the same wherever it begins.
+    let size = groups.div_ceil(parallel::threads()).max(1);
+    let parts = stage.collect(groups.div_ceil(size), GRAPH, &|i| {
+        let piece = parallel::piece(groups, size, i);
+        let mut merged = Links::with_capacity(piece.len())?;
+        // Where the link to a group stands among those of one.
+        let mut places = filled(usize::MAX, groups, GRAPH)?;
+        for one in piece {
+            let own = &members[first[one]..first[one + 1]];
+            let from = |member: u32| links.from(member as usize);
+            merged.push(own.iter().map(|&member| from(member).len()).sum(), |list| {
+                let start = list.len();
+                for &member in own {
+                    for link in from(member) {
+                        let to = group[link.to as usize];
+                        if to as usize == one {
+                            continue;
+                        }
+                        let evidence = signed(flipped[member as usize] ^ flipped[link.to as usize], link.evidence);
+                        let place = &mut places[to as usize];
+                        if !(start..list.len()).contains(place) || list[*place].to != to {
+                            *place = list.len();
+                            list.push(Link { to, evidence: 0.0 });
+                        }
+                        list[*place].evidence += evidence;
                     }
-                    let evidence = signed(flipped[member as usize] ^ flipped[link.to as usize], link.evidence);
-                    let place = &mut places[to as usize];
-                    if !(start..list.len()).contains(place) || list[*place].to != to {
-                        *place = list.len();
-                        list.push(Link { to, evidence: 0.0 });
-                    }
-                    list[*place].evidence += evidence;
                 }
-            }
-        })?;
-    }
-    Ok(merged)
+            })?;
+        }
+        Ok(merged)
+    })?;
+    Links::joined(parts)
 }
 
 /// Flips what gains by it by the links, also those `across` the air, round by round; each flip raises the sum of all evidence.
 #[inline(never)]
-fn mend(links: &Links, across: Option<&Links>, own: &dyn Fn(usize) -> f32, flipped: &mut [bool]) -> Result<(), Error> {
+fn mend(
+    links: &Links,
+    across: Option<&Links>,
+    own: &(dyn Fn(usize) -> f32 + Sync),
+    flipped: &mut [bool],
+    stage: &Stage,
+) -> Result<(), Error> {
     /// More flip next to nothing.
     const MENDING_ROUNDS: usize = 16;
     /// Less is rounding.
     const LEAST: f32 = 1e-6;
-    // Whose neighbours changed since it was asked.
-    let mut is_stirred = filled(true, flipped.len(), GRAPH)?;
+    let levels = || iter::once(links).chain(across);
+    let gains = |flipped: &[bool], one: usize| {
+        let evidence: f32 = levels().map(|links| support(links, flipped, one)).sum();
+        evidence + signed(flipped[one], own(one)) < -LEAST
+    };
+    // Who is to be asked: who gains as it is, and then whose neighbours changed since.
+    let mut is_stirred = each(flipped.len(), stage, |one| gains(flipped, one))?;
     for _ in 0..MENDING_ROUNDS {
         let mut any = false;
         for one in 0..flipped.len() {
             if !std::mem::take(&mut is_stirred[one]) {
                 continue;
             }
-            let each = || iter::once(links).chain(across);
-            let evidence: f32 = each().map(|links| support(links, flipped, one)).sum();
-            if evidence + signed(flipped[one], own(one)) < -LEAST {
+            if gains(flipped, one) {
                 flipped[one] = !flipped[one];
                 any = true;
-                each().flat_map(|links| links.from(one)).for_each(|link| is_stirred[link.to as usize] = true);
+                levels().flat_map(|links| links.from(one)).for_each(|link| is_stirred[link.to as usize] = true);
             }
         }
         if !any {

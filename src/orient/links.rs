@@ -155,6 +155,17 @@ impl Links {
         Ok(())
     }
 
+    /// Those of some groups, those of the next, and so on.
+    pub fn joined(parts: Vec<Self>) -> Result<Self, Error> {
+        let mut all = Self::with_capacity(parts.iter().map(Self::len).sum())?;
+        for Self { runs, lists } in parts {
+            let before = all.lists.len();
+            all.runs.extend(runs.into_iter().map(|run| Run { list: before + run.list, ..run }));
+            all.lists.extend(lists);
+        }
+        Ok(all)
+    }
+
     /// How many patches or groups there are.
     pub fn len(&self) -> usize {
         self.runs.len()
