@@ -260,8 +260,8 @@ impl Window {
         let share = 1.0 / total;
         let [uu, uv, vv, uuu, uuv, uvv, vvv, u4, u3v, uuvv, uv3, v4, hu, hv, huu, huv, hvv, hh] =
             sums.map(|sum| sum * share);
-        // The means of u, v and h are zero. So of the system the part of 1, u and v is solved by hand: `in_u` and `in_v` are
-        // what uu, uv and vv have in common with u and v, and the bends are told by the rest of them.
+        // The means of u, v and h are zero, so that the part of 1, u and v is easily taken out of the normal equations: by
+        // `means`, `in_u` and `in_v`, the fit of these three to uu, uv and vv. What that leaves of them tells the bends.
         let determinant = uu * vv - uv * uv;
         if determinant <= 0.0 {
             return None;
@@ -362,7 +362,8 @@ struct Fit {
 fn inverse([a, b, c]: [DVec3; 3]) -> Option<[DVec3; 3]> {
     let (x, y, z) = (b.cross(c), c.cross(a), a.cross(b));
     let determinant = a.dot(x);
-    (determinant > 0.0).then(|| [x, y, z].map(|column| column / determinant))
+    // By Sylvester's criterion.
+    (a.x > 0.0 && z.z > 0.0 && determinant > 0.0).then(|| [x, y, z].map(|column| column / determinant))
 }
 
 /// The two other eigenvectors of a covariance, and its eigenvalues, the largest first.
@@ -552,6 +553,35 @@ mod tests {
         }
         assert!(!is_told(&|_, uniform| 0.08 * gauss(uniform)), "little noise");
         assert!(!is_told(&|_, uniform| 1.4 * uniform()), "all of the cubes filled");
+    }
+
+    /// However narrow the strip is: rounding must not make the least certain of all normals the most certain one.
+    #[test]
+    fn a_narrow_strip_never_claims_more_than_certainty() {
+        let mut uniform = uniform();
+        for tenths in 0..80 {
+            let width = 10f32.powf(-0.1 * tenths as f32);
+            let strip = window((0..40).map(|_| Vec3::new(uniform(), width * uniform(), 0.3 * width * uniform()))).fit();
+            assert!(strip.error > 0.0 && strip.error_growth >= 0.0, "{width}: {strip:?}");
+            let Quadric { slope, bend, .. } = strip.quadric;
+            assert!(slope.is_finite() && bend.diagonal.is_finite() && bend.off.is_finite(), "{width}: {strip:?}");
+        }
+    }
+
+    #[test]
+    fn the_inverse_is_that_of_positive_definite_matrices_only() {
+        let rows = [DVec3::new(4.0, 1.0, -0.5), DVec3::new(1.0, 3.0, 0.2), DVec3::new(-0.5, 0.2, 2.0)];
+        let found = inverse(rows).unwrap();
+        for (i, row) in rows.into_iter().enumerate() {
+            for (j, column) in found.into_iter().enumerate() {
+                assert!((row.dot(column) - f64::from(u8::from(i == j))).abs() < 1e-15, "{i}, {j}");
+            }
+        }
+        // Two negative eigenvalues leave the determinant positive.
+        assert_eq!(inverse([DVec3::X, -DVec3::Y, -DVec3::Z]), None);
+        assert_eq!(inverse([-DVec3::X, -DVec3::Y, DVec3::Z]), None);
+        assert_eq!(inverse([DVec3::X, DVec3::Y, DVec3::ZERO]), None);
+        assert_eq!(inverse([DVec3::NAN; 3]), None);
     }
 
     #[test]
