@@ -33,8 +33,9 @@ pub(crate) fn parse(text: &[u8], single: bool) -> Option<(f64, usize)> {
         digits(text, &mut after, &mut power);
         if after > first {
             at = after;
+            let zeros = text[first..after].iter().take_while(|byte| **byte == b'0').count();
             // Beyond every float in any case; a power of more digits may have wrapped round.
-            let power = if after - first > 18 { i64::MAX / 4 } else { power as i64 };
+            let power = if after - first - zeros > 18 { i64::MAX / 4 } else { power as i64 };
             exponent += if negative { -power } else { power };
         }
     }
@@ -46,8 +47,7 @@ pub(crate) fn parse(text: &[u8], single: bool) -> Option<(f64, usize)> {
     Some((if negative { -value } else { value }, at))
 }
 
-/// The bits of a whole number without sign or with one, in two's complement; none if the text is no such number, or
-/// one below `-2^63` or above `2^64 - 1`.
+/// Whether a whole number is negative, and its size; none if the text is no such number, or its size is above `2^64 - 1`.
 pub(crate) fn parse_whole(text: &[u8]) -> Option<(bool, u64)> {
     let (negative, digits) = match text {
         [b'-', digits @ ..] => (true, digits),
@@ -225,6 +225,8 @@ mod tests {
             "2.2250738585072014e-308",
             "1e99999999999999999999",
             "1e-99999999999999999999",
+            "1e0000000000000000001",
+            "1e-0000000000000000001",
             "0e99999999999999999999",
             "3.4028234663852886e38",
             "3.4028235677973366e38",
