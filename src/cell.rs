@@ -51,10 +51,10 @@ pub(crate) fn paper_edge(extent: DVec3, count: usize) -> f64 {
     if edge > 0.0 && edge.is_finite() { edge } else { 1.0 }
 }
 
-/// The edge of `size`, in units of the positions; one of these is `unit` of the input.
-pub(crate) fn edge_of_size(size: f64, unit: f64) -> Result<f64, Error> {
+/// The edge of `size`, in units of the positions; one of these is `unit` of the input, and the paper's L `paper` of them.
+pub(crate) fn edge_of_size(size: f64, unit: f64, paper: f64) -> Result<f64, Error> {
     let edge = size / unit;
-    if edge.is_normal() && edge.recip().is_normal() {
+    if [edge, edge.recip(), edge / paper].iter().all(|number| number.is_normal()) {
         return Ok(edge);
     }
     let size = number::text(size);

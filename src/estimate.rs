@@ -138,7 +138,7 @@ fn run(points: Points, options: &Options, progress: &Progress) -> Result<Estimat
         (Method::Bilinear, Cell::Auto) => adaptive(points.owned()?, &cloud, options, laps),
         (Method::Bilinear, Cell::Scale(scale)) => bilinear(points, &cloud, options, scale * cloud.paper_edge(), laps),
         (Method::Bilinear, Cell::Size(size)) => {
-            bilinear(points, &cloud, options, cell::edge_of_size(size, cloud.unit)?, laps)
+            bilinear(points, &cloud, options, cell::edge_of_size(size, cloud.unit, cloud.paper_edge())?, laps)
         }
         (Method::Knn, _) => {
             baseline(points, &cloud, options, Baseline::Knn { k: options.k.unwrap_or(16) as usize }, laps)
