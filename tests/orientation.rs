@@ -592,6 +592,21 @@ fn towards_a_viewpoint_at_any_distance() {
     }
 }
 
+/// Farther away than numbers reach in units of the cloud, and not along an axis.
+#[test]
+fn towards_a_viewpoint_beyond_all_numbers() {
+    let wall: Vec<f64> =
+        (0..100).flat_map(|i| [0.866 * f64::from(i % 10), 0.5 * f64::from(i % 10), f64::from(i / 10)]).collect();
+    for (unit, far) in [(1.0, 1.0), (1e-300, 1.0), (1e-300, 1e290), (1.0, 1e299)] {
+        let points: Vec<f64> = wall.iter().map(|c| c * unit).collect();
+        let options = Options { orient: Orient::Viewpoint([1e9 * far, 1e3 * far, 0.0]), ..Options::default() };
+        let result = run_with(&Points::from_f64(&points).unwrap(), &options);
+        for normal in result.normals.chunks_exact(3) {
+            assert!((normal[0] - 0.5).abs() < 1e-3, "{normal:?} in units of {unit}, {far}");
+        }
+    }
+}
+
 #[test]
 fn every_point_knows_its_component() {
     let both = joined([sphere(20_000, 7), moved(sphere(40_000, 8), [5.0, 0.0, 0.0], 1.0)]);

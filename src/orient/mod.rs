@@ -63,8 +63,11 @@ pub(crate) fn orient(
         }
         (Orient::None, _) | (_, None) => Ok(None),
         (Orient::Viewpoint(viewpoint), Some(points)) => {
-            // Within what three times as much can be added up of.
-            let viewpoint = ((DVec3::from(viewpoint) - points.origin) / points.unit).clamp(-FARTHEST, FARTHEST);
+            // Half of each: so their difference is a number, whatever they are.
+            let viewpoint = 0.5 * DVec3::from(viewpoint) - 0.5 * points.origin;
+            // From farther away it would be the same direction.
+            let nearer = (1e300 * points.unit / viewpoint.abs().max_element()).min(1.0);
+            let viewpoint = viewpoint * nearer / (0.5 * points.unit);
             face(normals, &|point| viewpoint - points.positions[point].as_dvec3(), stage).map(|()| None)
         }
         (Orient::Consistent | Orient::Outward, Some(points)) => {
@@ -73,8 +76,6 @@ pub(crate) fn orient(
         }
     }
 }
-
-const FARTHEST: DVec3 = DVec3::splat(1e300);
 
 /// Turns the normal of every point to the side that `towards` names; one across it keeps its sign.
 fn face(normals: &mut [Vec3], towards: &(dyn Fn(usize) -> DVec3 + Sync), stage: &Stage) -> Result<(), Error> {
