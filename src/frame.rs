@@ -39,7 +39,9 @@ impl Frame {
         let mut axes = [DVec3::ZERO; 3];
         for i in 0..2 {
             let Some(&first) = sample.get(i) else { break };
-            let mut axis = first - mean;
+            let axis = first - mean;
+            // Of a length from 1 to 2, by a power of two that changes no bit: its seventh power would not be a number.
+            let mut axis = axis / f64::from_bits(axis.length().to_bits() >> 52 << 52);
             for _ in 0..ROUNDS {
                 let squares: f64 = sample.iter().map(|&point| (point - mean).dot(axis).powi(2)).sum();
                 let mut next = DVec3::ZERO;
