@@ -11,8 +11,7 @@ const checks = {
   // A crate of its own, so that nobody downloads its peers to run the tests.
   'Rust of the peers is formatted': () =>
     run('cargo', ['fmt', '--check', '--manifest-path', 'benches/peers/Cargo.toml']),
-  'Rust of the fuzz targets is formatted': () =>
-    run('cargo', ['fmt', '--check', '--manifest-path', 'fuzz/Cargo.toml']),
+  'Rust of the fuzz targets is formatted': () => run('cargo', ['fmt', '--check', '--manifest-path', 'fuzz/Cargo.toml']),
   'clippy, native': () => clippy('--all-targets'),
   'clippy, native without threads': () => clippy('--all-targets', '--no-default-features', '--features', 'full'),
   'clippy, wasm core': () => clippy('--lib', '--no-default-features', ...wasm),
