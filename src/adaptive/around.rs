@@ -72,6 +72,7 @@ impl Around {
             let first = 64 * (corner.z + z);
             let row = Vec3::new(0.0, 0.0, z as f32) - reach as f32;
             for near in set_bits(self.occupied[first as usize / 64] >> shift & rows) {
+                // It never is more, but so the compiler knows.
                 let cube = self.cubes[(first + shift + near) as usize % 512];
                 self.list[count] = Near { step: STEPS[near as usize] + row, cube };
                 count += 1;

@@ -241,7 +241,6 @@ impl Level {
                         let samples = &self.samples[range(&self.sample_end, cube as usize)];
                         window.add(samples, step, shares.element_product());
                     }
-                    window.end();
                 }
                 // SAFETY: once for each cube.
                 unsafe { surfaces.write(cube, window.fit()) };

@@ -101,8 +101,8 @@ impl Window {
         self.count += samples.len();
     }
 
-    /// What the lanes beyond the last sample hold weighs nothing.
-    pub fn end(&mut self) {
+    /// Lets what the lanes beyond the last sample hold weigh nothing.
+    pub fn pad(&mut self) {
         for number in [POINTS, WEIGHT] {
             self.numbers[number][self.count..self.count.next_multiple_of(4)].fill(0.0);
         }

@@ -140,7 +140,8 @@ const DETAIL: f64 = 0.001;
 impl Window {
     /// The surface that fits the samples best: the plane of the principal components, then by least squares the height
     /// over it as a quadratic function.
-    pub fn fit(&self) -> Surface {
+    pub fn fit(&mut self) -> Surface {
+        self.pad();
         let moments = self.moments();
         if moments[0] < 3.0 {
             return Surface::NONE;
@@ -398,7 +399,6 @@ mod tests {
     fn window_of(list: &[Sample]) -> Window {
         let mut window = Window::new();
         window.add(list, Vec3::ZERO, 1.0);
-        window.end();
         window
     }
 
@@ -440,7 +440,7 @@ mod tests {
         let mut uniform = uniform();
         for _ in 0..200 {
             // The noise has a deviation of 0.05.
-            let noisy = window(grid(7).map(|(x, y)| Vec3::new(x, y, 0.05 * (uniform() + uniform() + uniform()))));
+            let mut noisy = window(grid(7).map(|(x, y)| Vec3::new(x, y, 0.05 * (uniform() + uniform() + uniform()))));
             let surface = noisy.fit();
             assert!((surface.noise.sqrt() / 0.05 - 1.0).abs() < 0.4, "{}", surface.noise);
             let (gradient, _) = surface.quadric.at(surface.quadric.centre);
@@ -455,7 +455,7 @@ mod tests {
         let mut uniform = uniform();
         let rounds = 200;
         let squares = (0..rounds).map(|_| {
-            let noisy = window(grid(7).map(|(x, y)| Vec3::new(x, y, 0.05 * (uniform() + uniform() + uniform()))));
+            let mut noisy = window(grid(7).map(|(x, y)| Vec3::new(x, y, 0.05 * (uniform() + uniform() + uniform()))));
             // As far from its edge as that is from the middle.
             noisy.fit().quadric.at(Vec3::new(2.0, 0.0, 0.0)).1.powi(2)
         });
@@ -590,7 +590,7 @@ mod tests {
         assert!(!window((0..9).map(|_| Vec3::splat(0.3))).fit().is_some());
         assert!(!window((0..9).map(|i| 0.1 * i as f32 * Vec3::ONE)).fit().is_some());
         // A bent line lies in a plane, but in any other as well.
-        let line = window((0..40).map(|i| Vec3::new(0.05 * i as f32, 1e-3 * (i * i) as f32 / 40.0, 0.0)));
+        let mut line = window((0..40).map(|i| Vec3::new(0.05 * i as f32, 1e-3 * (i * i) as f32 / 40.0, 0.0)));
         assert!(line.fit().error > 0.03);
     }
 }
