@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::lattice::mixed;
+use crate::message::message;
 use crate::number;
 use crate::order::{from_ordinal, ordinal, sort};
 use crate::parallel::{self, Gathering};
@@ -58,7 +59,7 @@ pub(crate) fn edge_of_size(size: f64, unit: f64, paper: f64) -> Result<f64, Erro
         return Ok(edge);
     }
     let size = number::text(size);
-    Err(Error::input(format_args!("cell.size is {size}, out of all proportion to the cloud; wanted another")))
+    Err(Error::Input(message!["cell.size is ", size, ", out of all proportion to the cloud; wanted another"]))
 }
 
 /// How densely the bulk of a cloud is covered.

@@ -1,5 +1,6 @@
 //! What can go wrong, classed by who can act on it.
 
+use crate::message::message;
 use std::fmt;
 
 /// Every error of this crate.
@@ -42,15 +43,8 @@ impl Error {
     /// A [`Error::Format`] that belongs to one place of the file, or to the file as a whole.
     #[cold]
     #[inline(never)]
-    pub(crate) fn format(place: Option<Place>, message: fmt::Arguments) -> Self {
-        Self::Format { message: message.to_string(), place }
-    }
-
-    /// A [`Error::Input`].
-    #[cold]
-    #[inline(never)]
-    pub(crate) fn input(message: fmt::Arguments) -> Self {
-        Self::Input(message.to_string())
+    pub(crate) fn format(place: Option<Place>, message: String) -> Self {
+        Self::Format { message, place }
     }
 
     /// A [`Error::Limit`] for an allocation that the system refused.
@@ -58,27 +52,33 @@ impl Error {
     #[inline(never)]
     pub(crate) fn memory(what: &str, needed: u64) -> Self {
         Self::Limit {
-            message: format!("no memory for {what}; use fewer points, or allow more memory"),
+            message: message!["no memory for ", what, "; use fewer points, or allow more memory"],
             needed,
             available: None,
+        }
+    }
+
+    /// All there is to say.
+    #[optimize(size)]
+    pub(crate) fn text(&self) -> String {
+        match self {
+            Self::Format { message, place: Some(Place::Line(line)) } => message!["line ", line, ": ", message],
+            Self::Format { message, place: Some(Place::Byte(byte)) } => message!["byte ", byte, ": ", message],
+            Self::Limit { message, needed, available: None } => message![message, " (", needed, " bytes needed)"],
+            Self::Limit { message, needed, available: Some(available) } => {
+                message![message, " (", needed, " bytes needed, ", available, " available)"]
+            }
+            Self::Format { message, place: None } | Self::Input(message) | Self::Unsupported(message) => {
+                message.clone()
+            }
+            Self::Cancelled => "cancelled".into(),
         }
     }
 }
 
 impl fmt::Display for Error {
-    #[optimize(size)]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Format { message, place: None } => f.write_str(message),
-            Self::Format { message, place: Some(Place::Line(line)) } => write!(f, "line {line}: {message}"),
-            Self::Format { message, place: Some(Place::Byte(byte)) } => write!(f, "byte {byte}: {message}"),
-            Self::Input(message) | Self::Unsupported(message) => f.write_str(message),
-            Self::Limit { message, needed, available: None } => write!(f, "{message} ({needed} bytes needed)"),
-            Self::Limit { message, needed, available: Some(available) } => {
-                write!(f, "{message} ({needed} bytes needed, {available} available)")
-            }
-            Self::Cancelled => f.write_str("cancelled"),
-        }
+        f.write_str(&self.text())
     }
 }
 

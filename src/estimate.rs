@@ -8,6 +8,7 @@ use crate::error::Error;
 use crate::frame::Frame;
 use crate::grid::Grid;
 use crate::lattice::{CUBES, Lattice};
+use crate::message::message;
 use crate::nodes::{self, Node};
 use crate::normals::Found;
 use crate::options::{Cell, Method, Options, Orient};
@@ -108,7 +109,7 @@ fn run(points: Points, options: &Options, progress: &Progress) -> Result<Estimat
     options.validate()?;
     // Places and counts are 32-bit numbers.
     if points.len() >= u32::MAX as usize {
-        return Err(Error::input(format_args!("the cloud has {} points; at most {} fit", points.len(), u32::MAX - 1)));
+        return Err(Error::Input(message!["the cloud has ", points.len(), " points; at most ", u32::MAX - 1, " fit"]));
     }
     let share = match options.orient {
         _ if !cfg!(feature = "full") => 1.0,

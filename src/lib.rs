@@ -41,6 +41,7 @@ mod lanes;
 mod lattice;
 mod lists;
 mod median;
+mod message;
 mod nodes;
 mod normals;
 mod number;

@@ -1,6 +1,7 @@
 //! Every option, with its default, unit, range and advice.
 
 use crate::error::Error;
+use crate::message::message;
 use crate::number::text;
 
 /// What to estimate, and how. `Options::default()` is right for most scans.
@@ -99,21 +100,21 @@ impl Options {
             Cell::Auto => {}
             Cell::Scale(scale) if (0.1..=100.0).contains(&scale) => {}
             Cell::Scale(scale) => {
-                return Err(Error::Input(format!("cell.scale is {}; wanted a number from 0.1 to 100", text(scale))));
+                return Err(Error::Input(message!["cell.scale is ", text(scale), "; wanted a number from 0.1 to 100"]));
             }
             Cell::Size(size) if size > 0.0 && size.is_finite() => {}
             Cell::Size(size) => {
-                return Err(Error::Input(format!("cell.size is {}; wanted a finite number above 0", text(size))));
+                return Err(Error::Input(message!["cell.size is ", text(size), "; wanted a finite number above 0"]));
             }
         }
         if let Some(k) = self.k
             && k < LEAST_NEIGHBOURS
         {
-            return Err(Error::input(format_args!("k is {k}; wanted a whole number of at least {LEAST_NEIGHBOURS}")));
+            return Err(Error::Input(message!["k is ", k, "; wanted a whole number of at least ", LEAST_NEIGHBOURS]));
         }
         let vector = |name: &str, [x, y, z]: [f64; 3], wanted: &str| {
             let [x, y, z] = [x, y, z].map(text);
-            Err(Error::Input(format!("orient.{name} is {x}, {y}, {z}; wanted {wanted}")))
+            Err(Error::Input(message!["orient.", name, " is ", x, ", ", y, ", ", z, "; wanted ", wanted]))
         };
         if self.components && !matches!(self.orient, Orient::Consistent | Orient::Outward) {
             return Err(Error::Input(

@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::lanes::load;
 use crate::lists::{fitted, reserve};
+use crate::message::message;
 use crate::order::{from_ordinal, ordinal, sort};
 use crate::parallel;
 use crate::power::{exp2, log2};
@@ -113,7 +114,7 @@ fn check_length(length: usize) -> Result<(), Error> {
     if length.is_multiple_of(3) {
         return Ok(());
     }
-    Err(Error::Input(format!("positions has {length} numbers; wanted a multiple of 3 (x y z of each point)")))
+    Err(Error::Input(message!["positions has ", length, " numbers; wanted a multiple of 3 (x y z of each point)"]))
 }
 
 /// Numbers below `count`, one from each of at most `most` strides of one length.

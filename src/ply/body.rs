@@ -8,6 +8,7 @@
 use super::cursor::Cursor;
 use super::header::{Element, Header};
 use crate::error::{Error, Place};
+use crate::message::message;
 use crate::parallel::{self, Scatter};
 
 /// Rows of a part, where rows can be told apart without reading them.
@@ -85,7 +86,7 @@ impl<'a> Body<'a> {
         let ends = |rows: u64, at: usize| {
             Error::format(
                 Some(Place::Byte(at as u64)),
-                format_args!("the file ends after {rows} of {} rows of element {}", element.count, element.label()),
+                message!["the file ends after ", rows, " of ", element.count, " rows of element ", element.label()],
             )
         };
         match element.stride() {
@@ -154,11 +155,14 @@ impl<'a> Body<'a> {
             if there < element.count {
                 return Err(Error::format(
                     Some(Place::Line(line)),
-                    format_args!(
-                        "the file ends after {there} of {} rows of element {}",
+                    message![
+                        "the file ends after ",
+                        there,
+                        " of ",
                         element.count,
+                        " rows of element ",
                         element.label()
-                    ),
+                    ],
                 ));
             }
             start += element.count;
@@ -171,7 +175,7 @@ impl<'a> Body<'a> {
             let values = values as u64;
             return Err(Error::format(
                 Some(Place::Line(body_line)),
-                format_args!("{bytes} bytes of text cannot hold the {values} values that the header declares"),
+                message![bytes, " bytes of text cannot hold the ", values, " values that the header declares"],
             ));
         }
         Ok(())

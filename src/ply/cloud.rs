@@ -4,6 +4,7 @@ use super::columns::NAMES;
 use super::sink::Sink;
 use super::{Additions, PointCloud, write};
 use crate::error::Error;
+use crate::message::message;
 use crate::number::print_whole;
 use crate::progress::Progress;
 
@@ -83,5 +84,5 @@ fn check(length: usize, each: usize, count: usize, name: &str) -> Result<(), Err
     if length == each * count {
         return Ok(());
     }
-    Err(Error::input(format_args!("{name} has {length} values; wanted {each} for each of the {count} points")))
+    Err(Error::Input(message![name, " has ", length, " values; wanted ", each, " for each of the ", count, " points"]))
 }

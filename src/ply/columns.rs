@@ -3,6 +3,7 @@
 use super::header::{Element, Kind, shorten};
 use super::scalar::{Scalar, bits};
 use crate::error::Error;
+use crate::message::message;
 use crate::parallel::Filling;
 use glam::DVec3;
 use std::mem::MaybeUninit;
@@ -79,7 +80,7 @@ pub(super) fn find(vertex: &Element) -> Result<Option<Vec<Column>>, Error> {
         if vertex.properties.iter().filter(|property| property.name == name).count() > 1 {
             return Err(Error::format(
                 None,
-                format_args!("property {} of element vertex is declared twice; wanted one", shorten(name)),
+                message!["property ", shorten(name), " of element vertex is declared twice; wanted one"],
             ));
         }
     }

@@ -4,8 +4,8 @@ use super::Format;
 use super::header::{Element, Kind, shorten};
 use super::scalar::{Scalar, bits};
 use crate::error::{Error, Place};
+use crate::message::message;
 use crate::number;
-use std::fmt::Arguments;
 
 /// Where the next value is. A row of text is one line; blank lines are passed over.
 #[derive(Clone)]
@@ -132,17 +132,21 @@ impl<'a> Cursor<'a> {
                 return Ok(value as u64);
             }
             let text = shorten(self.bytes[start..self.at].trim_ascii());
-            return Err(self.error(format_args!("'{text}' as the length of a list; wanted a whole number from 0")));
+            return Err(self.error(message!["'", text, "' as the length of a list; wanted a whole number from 0"]));
         }
         let word = bits(self.take(count, element)?, self.is_big_endian());
         let length = count.to_i64(word);
         let (sign, size) =
             if count.is_signed() && length < 0 { ("-", length.unsigned_abs()) } else { ("", length as u64) };
         if !sign.is_empty() || size > ((self.bytes.len() - self.at) / item.size()) as u64 {
-            return Err(self.error(format_args!(
-                "a row of element {} has a list of {sign}{size} values; wanted 0 or more, none past the end of the file",
-                element.label()
-            )));
+            return Err(self.error(message![
+                "a row of element ",
+                element.label(),
+                " has a list of ",
+                sign,
+                size,
+                " values; wanted 0 or more, none past the end of the file"
+            ]));
         }
         Ok(size)
     }
@@ -169,11 +173,13 @@ impl<'a> Cursor<'a> {
             return Ok(bits(value, self.is_big_endian()));
         }
         text_bits(value, scalar).ok_or_else(|| {
-            self.error(format_args!(
-                "'{}' is no value of type {}; the output can keep it only as ASCII",
+            self.error(message![
+                "'",
                 shorten(value),
-                scalar.name()
-            ))
+                "' is no value of type ",
+                scalar.name(),
+                "; the output can keep it only as ASCII"
+            ])
         })
     }
 
@@ -199,14 +205,14 @@ impl<'a> Cursor<'a> {
     /// An error in this row.
     #[cold]
     #[inline(never)]
-    fn error(&self, message: Arguments) -> Error {
+    fn error(&self, message: String) -> Error {
         Error::format(Some(if self.is_text() { Place::Line(self.line) } else { Place::Byte(self.row as u64) }), message)
     }
 
     #[cold]
     #[inline(never)]
     fn ends(&self, element: &Element) -> Error {
-        self.error(format_args!("the file ends within element {}", element.label()))
+        self.error(message!["the file ends within element ", element.label()])
     }
 
     /// Why the text that was wanted here is not to be had: the line ended, or something else is in its place.
@@ -219,7 +225,7 @@ impl<'a> Cursor<'a> {
             return self.miscounted(element);
         };
         let hint = if token.contains(&b',') { "; wanted a decimal point, and blanks between values" } else { "" };
-        self.error(format_args!("'{}' is not a number{hint}", shorten(token)))
+        self.error(message!["'", shorten(token), "' is not a number", hint])
     }
 
     #[cold]
@@ -236,11 +242,17 @@ impl<'a> Cursor<'a> {
         row.skip_line();
         let cut = if row.at == row.bytes.len() { ", and the file ends here" } else { "" };
         let lists = if element.stride().is_some() { "" } else { " and the values of its lists" };
-        self.error(format_args!(
-            "{values} value{plural}, the header declares {} for element {}{lists}{cut}",
+        self.error(message![
+            values,
+            " value",
+            plural,
+            ", the header declares ",
             element.properties.len(),
-            element.label()
-        ))
+            " for element ",
+            element.label(),
+            lists,
+            cut
+        ])
     }
 }
 

@@ -3,6 +3,7 @@
 use super::Format;
 use super::scalar::{self, Scalar};
 use crate::error::{Error, Place};
+use crate::message::message;
 use crate::number::parse_whole;
 
 /// No honest header comes near; bounds the work on a file that only begins like one.
@@ -105,7 +106,7 @@ impl<'a> Header<'a> {
         while let Some(text) = lines.next() {
             let number = lines.number;
             if lines.at - start > HEADER_BYTES_MAX {
-                return wrong(number, format_args!("the header has no end_header within 16 MiB"));
+                return wrong(number, message!["the header has no end_header within 16 MiB"]);
             }
             let mut words = text;
             let kind = match word(&mut words) {
@@ -113,7 +114,7 @@ impl<'a> Header<'a> {
                 b"comment" | b"obj_info" => LineKind::Comment,
                 b"end_header" => {
                     let Some(format) = format else {
-                        return wrong(number, format_args!("no format line; wanted one, as in 'format ascii 1.0'"));
+                        return wrong(number, message!["no format line; wanted one, as in 'format ascii 1.0'"]);
                     };
                     header.format = format;
                     header.body = lines.at;
@@ -123,7 +124,7 @@ impl<'a> Header<'a> {
                 b"format" => {
                     let found = parse_format(text, words, number)?;
                     if format.is_some_and(|before| before != found) {
-                        return wrong(number, format_args!("a second, different format line"));
+                        return wrong(number, message!["a second, different format line"]);
                     }
                     format = Some(found);
                     LineKind::Format
@@ -131,10 +132,10 @@ impl<'a> Header<'a> {
                 b"element" => {
                     let element = parse_element(text, words, number)?;
                     if element.name == b"vertex" && header.vertex().is_ok() {
-                        return wrong(number, format_args!("a second element named vertex; wanted one"));
+                        return wrong(number, message!["a second element named vertex; wanted one"]);
                     }
                     if header.elements.len() == ELEMENTS_MAX {
-                        return wrong(number, format_args!("more than {ELEMENTS_MAX} elements"));
+                        return wrong(number, message!["more than ", ELEMENTS_MAX, " elements"]);
                     }
                     header.elements.push(element);
                     LineKind::Element(header.elements.len() - 1)
@@ -142,7 +143,7 @@ impl<'a> Header<'a> {
                 b"property" => {
                     let owner = header.elements.len().wrapping_sub(1);
                     let Some(element) = header.elements.last_mut() else {
-                        return wrong(number, format_args!("a property before the first element"));
+                        return wrong(number, message!["a property before the first element"]);
                     };
                     element.properties.push(parse_property(text, words, number)?);
                     LineKind::Property(owner, element.properties.len() - 1)
@@ -150,17 +151,18 @@ impl<'a> Header<'a> {
                 other => {
                     return wrong(
                         number,
-                        format_args!(
-                            "'{}' is no word of a PLY header; wanted format, comment, obj_info, element, property or \
-                             end_header",
-                            shorten(other)
-                        ),
+                        message![
+                            "'",
+                            shorten(other),
+                            "' is no word of a PLY header; wanted format, comment, obj_info, element, property or \
+                             end_header"
+                        ],
                     );
                 }
             };
             header.lines.push(Line { text, kind });
         }
-        wrong(lines.number, format_args!("the file ends within the header; end_header is missing"))
+        wrong(lines.number, message!["the file ends within the header; end_header is missing"])
     }
 
     pub fn is_big_endian(&self) -> bool {
@@ -171,7 +173,7 @@ impl<'a> Header<'a> {
     #[optimize(size)]
     pub fn vertex(&self) -> Result<usize, Error> {
         let found = self.elements.iter().position(|element| element.name == b"vertex");
-        found.ok_or_else(|| Error::format(None, format_args!("no element vertex; it has {}", self.describe())))
+        found.ok_or_else(|| Error::format(None, message!["no element vertex; it has ", self.describe()]))
     }
 
     /// Why there are no points in element `vertex`, which lacks a coordinate.
@@ -181,13 +183,13 @@ impl<'a> Header<'a> {
         if vertex.properties.iter().any(|property| property.name == b"packed_position") {
             return Error::format(
                 None,
-                format_args!(
+                message![
                     "a compressed Gaussian splat file: its positions are packed, which is not supported; save it as an \
                      uncompressed splat PLY first"
-                ),
+                ],
             );
         }
-        Error::format(None, format_args!("no x y z as plain numbers; the file has {}", self.describe()))
+        Error::format(None, message!["no x y z as plain numbers; the file has ", self.describe()])
     }
 
     /// The texts of all comments and `obj_info` lines.
@@ -233,7 +235,7 @@ impl<'a> Header<'a> {
 #[cold]
 #[inline(never)]
 fn mistake(line: u64, text: &[u8], wanted: &str) -> Error {
-    Error::format(Some(Place::Line(line)), format_args!("'{}'; wanted {wanted}", quote(text, 80)))
+    Error::format(Some(Place::Line(line)), message!["'", quote(text, 80), "'; wanted ", wanted])
 }
 
 #[optimize(size)]
@@ -344,13 +346,13 @@ fn foreign(file: &[u8]) -> Error {
     ];
     let place = Some(Place::Byte(0));
     if file.is_empty() {
-        return Error::format(place, format_args!("the file is empty; wanted a PLY file"));
+        return Error::format(place, message!["the file is empty; wanted a PLY file"]);
     }
     if let Some((_, (what, advice))) = KNOWN.iter().find(|(magic, _)| file.starts_with(magic)) {
-        return Error::format(place, format_args!("not a PLY file but {what}{advice}"));
+        return Error::format(place, message!["not a PLY file but ", what, advice]);
     }
     let begin = shorten(file);
-    Error::format(place, format_args!("not a PLY file: it begins with '{begin}'; wanted 'ply' as the first line"))
+    Error::format(place, message!["not a PLY file: it begins with '", begin, "'; wanted 'ply' as the first line"])
 }
 
 /// A few bytes of a file for an error text.

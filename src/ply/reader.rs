@@ -6,6 +6,7 @@ use super::header::{Element, Header, decode};
 use super::scalar::bits;
 use super::{PointCloud, ReadOptions, tasks};
 use crate::error::Error;
+use crate::message::message;
 use crate::parallel::{self, Scatter};
 use crate::points::{SAMPLE, choose_origin, spread_in};
 use crate::progress::Progress;
@@ -41,7 +42,7 @@ pub fn read(file: &[u8], options: &ReadOptions, progress: &Progress) -> Result<P
         && vertex.count > most
     {
         let count = vertex.count;
-        return Err(Error::input(format_args!("the file declares {count} points; at most {most} were asked for")));
+        return Err(Error::Input(message!["the file declares ", count, " points; at most ", most, " were asked for"]));
     }
     let body = Body::locate(&header, file)?;
     let parts = body.parts(index);

@@ -8,6 +8,7 @@ use super::scalar::Scalar;
 use super::sink::Sink;
 use super::{Additions, Format, tasks};
 use crate::error::Error;
+use crate::message::message;
 use crate::parallel::Scatter;
 use crate::progress::{Progress, Stage};
 use std::sync::{Mutex, PoisonError};
@@ -117,9 +118,9 @@ impl Additions<'_> {
         for (name, numbers, each) in lengths {
             let length = numbers.map_or(count.saturating_mul(each), |numbers| numbers.len() as u64);
             if length != count.saturating_mul(each) {
-                return Err(Error::input(format_args!(
-                    "{name} has {length} numbers; wanted {each} for each of the {count} points"
-                )));
+                let message =
+                    message![name, " has ", length, " numbers; wanted ", each, " for each of the ", count, " points"];
+                return Err(Error::Input(message));
             }
         }
         Ok(())

@@ -2,6 +2,8 @@
 
 use crate::error::Error;
 use crate::lists::fitted;
+use crate::message::message;
+use crate::number;
 use bytemuck::AnyBitPattern;
 use wasm_bindgen::prelude::*;
 
@@ -31,7 +33,7 @@ impl Buffer {
     pub fn new(byte_length: f64) -> Result<Buffer, JsValue> {
         if !(byte_length >= 0.0 && byte_length.fract() == 0.0 && byte_length <= u64::MAX as f64) {
             let message =
-                format!("byteLength is {}; wanted a whole number of at least 0", crate::number::text(byte_length));
+                message!["byteLength is ", number::text(byte_length), "; wanted a whole number of at least 0"];
             return Err(Error::Input(message).into());
         }
         let too_large = Error::memory("the data", byte_length as u64);
@@ -79,7 +81,7 @@ impl Buffer {
         // Never misaligned: the allocator aligns every block to 8 bytes.
         match bytemuck::try_cast_slice(bytes) {
             Ok(numbers) if bytes.len().is_multiple_of(wanted) => Ok(numbers),
-            _ => Err(Error::Input(format!("{name} has {} bytes; wanted a multiple of {wanted}", bytes.len()))),
+            _ => Err(Error::Input(message![name, " has ", bytes.len(), " bytes; wanted a multiple of ", wanted])),
         }
     }
 

@@ -14,7 +14,7 @@ impl From<Error> for JsValue {
             }
             error => error,
         };
-        let thrown = js_sys::Error::new(&error.to_string());
+        let thrown = js_sys::Error::new(&error.text());
         let code = match error {
             Error::Format { place, .. } => {
                 match place {

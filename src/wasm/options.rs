@@ -1,6 +1,7 @@
 //! The options object of JavaScript, read name by name: whatever is misspelt or out of place is refused.
 
 use crate::error::Error;
+use crate::message::message;
 use crate::options::{Cell, Method, Options, Orient};
 use js_sys::{Array, JSON, Object, Reflect};
 use wasm_bindgen::prelude::*;
@@ -24,7 +25,7 @@ pub(super) fn parse(value: &JsValue) -> Result<Options, Error> {
     }
     for name in Object::keys(value.unchecked_ref::<Object>()).iter().filter_map(|name| name.as_string()) {
         if name.is_empty() || !NAMES.split([',', ' ']).any(|known| known == name) {
-            return Err(Error::Input(format!("option '{name}' is unknown; wanted any of {NAMES}")));
+            return Err(Error::Input(message!["option '", name, "' is unknown; wanted any of ", NAMES]));
         }
     }
     if !cfg!(feature = "full") {
@@ -103,14 +104,14 @@ fn three(value: &JsValue) -> Option<[f64; 3]> {
 #[cold]
 #[optimize(size)]
 fn refusal(name: &str, value: &JsValue, wanted: &str) -> Error {
-    Error::Input(format!("{name} is {}; wanted {wanted}", describe(value)))
+    Error::Input(message![name, " is ", describe(value), "; wanted ", wanted])
 }
 
 /// A value as its author wrote it, as far as JSON can tell, and not more than a line of it.
 fn describe(value: &JsValue) -> String {
     const LONGEST: usize = 60;
     let mut text = match value.as_string() {
-        Some(text) => format!("'{text}'"),
+        Some(text) => message!["'", text, "'"],
         None => match JSON::stringify(value) {
             // Not a number and the infinities are null in JSON.
             Ok(json) if json.is_string() && value.as_f64().is_none_or(f64::is_finite) => json.into(),

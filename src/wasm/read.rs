@@ -2,6 +2,8 @@
 
 use super::{Buffer, call, set};
 use crate::error::Error;
+use crate::message::message;
+use crate::number;
 use crate::ply::{self, PointCloud, ReadOptions};
 use js_sys::{Array, Function, Object};
 use wasm_bindgen::prelude::*;
@@ -53,5 +55,5 @@ fn whole(max_points: f64) -> Result<u64, Error> {
     if max_points >= 0.0 && (max_points.fract() == 0.0 || max_points.is_infinite()) {
         return Ok(max_points as u64);
     }
-    Err(Error::Input(format!("maxPoints is {}; wanted a whole number of at least 0", crate::number::text(max_points))))
+    Err(Error::Input(message!["maxPoints is ", number::text(max_points), "; wanted a whole number of at least 0"]))
 }

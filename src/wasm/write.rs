@@ -2,6 +2,7 @@
 
 use super::{Buffer, call};
 use crate::error::Error;
+use crate::message::message;
 use crate::ply::{self, Additions, Format, PointCloud};
 use js_sys::Function;
 use wasm_bindgen::prelude::*;
@@ -38,7 +39,7 @@ pub fn write_cloud(
 ) -> Result<Buffer, JsValue> {
     call(tell, |progress| {
         let &[x, y, z] = origin else {
-            return Err(Error::Input(format!("origin has {} numbers; wanted 3", origin.len())));
+            return Err(Error::Input(message!["origin has ", origin.len(), " numbers; wanted 3"]));
         };
         let add = additions(normals.as_ref(), curvature.as_ref())?;
         let cloud = PointCloud {
