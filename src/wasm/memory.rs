@@ -1,8 +1,17 @@
-//! How much of its memory the module uses: a counter round the standard allocator.
+//! How much of its memory the module uses: a counter round the allocator.
 
-use std::alloc::{GlobalAlloc, Layout, System};
+#[cfg(not(target_feature = "atomics"))]
+use lol_alloc::{AssumeSingleThreaded, FreeListAllocator};
+use std::alloc::{GlobalAlloc, Layout};
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering::Relaxed};
 use wasm_bindgen::prelude::*;
+
+/// Much smaller than the standard allocator. Knows no threads.
+#[cfg(not(target_feature = "atomics"))]
+// SAFETY: a module without atomics has one thread.
+static HEAP: AssumeSingleThreaded<FreeListAllocator> = unsafe { AssumeSingleThreaded::new(FreeListAllocator::new()) };
+#[cfg(target_feature = "atomics")]
+static HEAP: std::alloc::System = std::alloc::System;
 
 /// No single block may be larger, whatever is free.
 const LARGEST_BLOCK: u64 = isize::MAX as u64;
@@ -21,7 +30,7 @@ static AVAILABLE: AtomicUsize = AtomicUsize::new(0);
 struct Counting;
 
 /// Every block begins at a multiple of 8, whatever its type asks for: bytes and floats can be viewed as doubles. The
-/// standard allocator aligns to 8 anyway, so this costs nothing.
+/// allocators align to 8 anyway, so this costs nothing.
 fn aligned(layout: Layout) -> Layout {
     layout.align_to(8).unwrap_or(layout)
 }
@@ -41,21 +50,21 @@ fn free() -> u64 {
     (u64::from(MAXIMUM.load(Relaxed)) * PAGE).saturating_sub(USED.load(Relaxed) as u64)
 }
 
-// SAFETY: every call goes to the standard allocator, each block always with the same, possibly stricter, alignment.
+// SAFETY: every call goes to the same allocator, each block always with the same, possibly stricter, alignment.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let block = unsafe { System.alloc(aligned(layout)) };
+        let block = unsafe { HEAP.alloc(aligned(layout)) };
         count(block, layout.size());
         block
     }
 
     unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
         USED.fetch_sub(layout.size(), Relaxed);
-        unsafe { System.dealloc(block, aligned(layout)) }
+        unsafe { HEAP.dealloc(block, aligned(layout)) }
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        let block = unsafe { System.alloc_zeroed(aligned(layout)) };
+        let block = unsafe { HEAP.alloc_zeroed(aligned(layout)) };
         count(block, layout.size());
         block
     }
