@@ -26,6 +26,8 @@ pub(super) struct Chosen {
     pub variation: f32,
     /// The noise again, if the surface is thin against its width, so that its noise can be compared; infinite if not.
     pub flat_noise: f32,
+    /// The noise again, if the surface is a plane wherever cubes near by ask for it; infinite if not.
+    pub plane_noise: f32,
     /// How often the edge was doubled.
     pub doublings: u32,
 }
@@ -39,6 +41,7 @@ impl Chosen {
         error: f32::INFINITY,
         variation: 0.0,
         flat_noise: f32::INFINITY,
+        plane_noise: f32::INFINITY,
         doublings: 0,
     };
 
@@ -50,7 +53,7 @@ impl Chosen {
     /// All that votes, in its order.
     #[inline(always)]
     pub fn numbers(&self) -> [Vec4; 4] {
-        let numbers: &[f32; 19] = bytemuck::cast_ref(self);
+        let numbers: &[f32; 20] = bytemuck::cast_ref(self);
         std::array::from_fn(|i| load(&numbers[4 * i..]))
     }
 }
@@ -63,6 +66,11 @@ const MISFIT: f32 = 2.0;
 
 /// A neighbourhood is flat when it is so many times as wide as thick, squared.
 const FLAT: f32 = 2.0;
+
+/// A surface is plane if what it bends away from one, at the farthest cubes near it, is less than this share of its noise, or
+/// less than so much, both squared.
+const SAG: f32 = 0.5;
+const FLAT_SAG: f32 = 5e-7;
 
 /// Square angles less than this are no difference.
 const SAME: f32 = 1e-5;
@@ -128,7 +136,11 @@ fn of_cube(levels: &[Level], mut cube: IVec3, centroid: Vec3) -> Chosen {
             let quadric = Quadric { centre: centroid, height: height * scale * edge, slope: normal, bend };
             let flat_noise = if is_flat { noise } else { f32::INFINITY };
             let variation = surface.variation;
-            best = Chosen { quadric, noise, chance, error, variation, flat_noise, doublings };
+            // Two and a half edges away.
+            let sag = bend.square() * (3.125 * 3.125);
+            let is_plane = is_flat && !surface.lacks_detail && sag <= SAG * noise + FLAT_SAG;
+            let plane_noise = if is_plane { noise } else { f32::INFINITY };
+            best = Chosen { quadric, noise, chance, error, variation, flat_noise, plane_noise, doublings };
         }
         if is_flat {
             reference = reference.min(noise * (1.0 + EXCESS * (2.0 / (surface.points - 6.0)).sqrt()));

@@ -25,6 +25,11 @@ impl Matrix {
         Mat3::from_cols(Vec3::new(d.x, o.z, o.y), Vec3::new(o.z, d.y, o.x), Vec3::new(o.y, o.x, d.z)) * p
     }
 
+    /// The sum of the squares of its nine entries.
+    pub fn square(&self) -> f32 {
+        self.diagonal.length_squared() + 2.0 * self.off.length_squared()
+    }
+
     /// `a b^T + b a^T`, halved.
     #[inline(always)]
     pub fn product(a: Vec3, b: Vec3) -> Self {

@@ -7,6 +7,7 @@
 
 mod around;
 mod choose;
+mod faces;
 mod level;
 mod matrix;
 mod samples;

@@ -153,12 +153,7 @@ impl Window {
     /// The same, if the samples do not lie along a line, from their [`Window::moments`].
     #[inline(always)]
     fn through(&self, [points, total, x, y, z, xx, yy, zz, yz, xz, xy]: [f64; 11]) -> Option<Surface> {
-        let share = 1.0 / total;
-        let mean = DVec3::new(x, y, z) * share;
-        let diagonal = DVec3::new(xx, yy, zz) * share - mean * mean;
-        let off = DVec3::new(yz, xz, xy) * share - DVec3::new(mean.y * mean.z, mean.x * mean.z, mean.x * mean.y);
-        let covariance = Symmetric { diagonal, off };
-        let normal = covariance.normal(covariance.smallest_eigenvalue(), 1.0)?;
+        let (mean, normal, covariance) = plane_of(total, [x, y, z, xx, yy, zz, yz, xz, xy])?;
         let (u, v, [along, across, thick]) = principal(&covariance, normal);
         let (mean, normal) = (mean.as_vec3(), normal.as_vec3());
         let count = self.len() as f64;
@@ -365,6 +360,19 @@ fn inverse([a, b, c]: [DVec3; 3]) -> Option<[DVec3; 3]> {
     let determinant = a.dot(x);
     // By Sylvester's criterion.
     (a.x > 0.0 && z.z > 0.0 && determinant > 0.0).then(|| [x, y, z].map(|column| column / determinant))
+}
+
+/// The mean of some points, their normal and their covariance, from the sum of their weights and the sums over all of x, y, z,
+/// xx, yy, zz, yz, xz and xy; unless they lie along a line.
+#[inline(never)]
+pub(super) fn plane_of(total: f64, [x, y, z, xx, yy, zz, yz, xz, xy]: [f64; 9]) -> Option<(DVec3, DVec3, Symmetric)> {
+    let share = 1.0 / total;
+    let mean = DVec3::new(x, y, z) * share;
+    let diagonal = DVec3::new(xx, yy, zz) * share - mean * mean;
+    let off = DVec3::new(yz, xz, xy) * share - DVec3::new(mean.y * mean.z, mean.x * mean.z, mean.x * mean.y);
+    let covariance = Symmetric { diagonal, off };
+    let normal = covariance.normal(covariance.smallest_eigenvalue(), 1.0)?;
+    Some((mean, normal, covariance))
 }
 
 /// The two other eigenvectors of a covariance, and its eigenvalues, the largest first.

@@ -2,6 +2,7 @@
 
 use super::around::{Around, Near};
 use super::choose::Chosen;
+use super::faces::Faces;
 use super::level::{Level, Role};
 use super::matrix::{dot_lanes, times_lanes};
 use super::tally::Tally;
@@ -50,8 +51,9 @@ const SMOOTH: f32 = 0.05;
 /// So many where noise decides: then the normals differ because of it, but no more than on one surface.
 const SMOOTH_IN_NOISE: f32 = 0.12;
 
-/// Cubes whose surface rests on fewer points are not divided: the surfaces of the halves would rest on a quarter of them.
-const DIVIDED_POINTS: f32 = 60.0;
+/// Cubes whose surface rests on fewer points are not divided: the surfaces of the halves would rest on a quarter of them. Nor
+/// are faces looked for round them.
+const MANY_POINTS: f32 = 60.0;
 
 /// Where the normal is not known any better, square radians, the cube is divided as long as it can be: whatever is so uncertain
 /// agrees with everything.
@@ -100,13 +102,14 @@ struct Task<'a> {
     writer: Writer<'a>,
     around: Around,
     ballot: Ballot,
+    faces: Faces,
     resolved: u64,
 }
 
 impl<'a> Task<'a> {
     fn new(vote: &'a Vote<'a>) -> Self {
         let writer = vote.normals.writer();
-        Self { vote, writer, around: Around::new(), ballot: Ballot::default(), resolved: 0 }
+        Self { vote, writer, around: Around::new(), ballot: Ballot::default(), faces: Faces::default(), resolved: 0 }
     }
 
     /// Finds the normals of the points of a cube, unless it is to be divided: answers what its parts would be for, and only
@@ -116,7 +119,8 @@ impl<'a> Task<'a> {
     fn settle(&mut self, brick: usize, cube: usize, bit: u32) -> Role {
         let Vote { level, chosen, division, .. } = *self.vote;
         let (own, surface) = (&chosen[cube], &level.surfaces[cube]);
-        let can_divide = division < DIVISIONS && surface.points >= DIVIDED_POINTS;
+        let has_many = surface.points >= MANY_POINTS;
+        let can_divide = division < DIVISIONS && has_many;
         let mut smooth = None;
         if own.is_some() {
             let near = self.around.near(&level.grid, brick, bit, 1);
@@ -132,11 +136,13 @@ impl<'a> Task<'a> {
                 smooth = self.ballot.smooth(own.quadric.centre, tolerance);
             }
         }
+        let mut is_edge = false;
         if smooth.is_none() {
             let near = self.around.near(&level.grid, brick, bit, 2);
+            is_edge = has_many && self.faces.find(level, bit, near, chosen);
             // Else noise hides what the parts could tell, also of an edge in this very cube.
             let in_noise = near.iter().filter(|near| level.surfaces[near.cube as usize].is_plane_in_noise).count();
-            if can_divide && IN_NOISE * in_noise < near.len() {
+            if !is_edge && can_divide && IN_NOISE * in_noise < near.len() {
                 return Role::Wanted;
             }
             let noises = near.iter().map(|near| chosen[near.cube as usize].flat_noise);
@@ -144,9 +150,13 @@ impl<'a> Task<'a> {
         }
         let placed = level.points(cube);
         let centre = cube_centre(bit);
-        if let Some(smooth) = &smooth {
+        if is_edge || smooth.is_some() {
             for four in placed.chunks(4) {
-                let (directions, points) = smooth.directions(four, centre);
+                let (places, points) = places(four, centre);
+                let directions = match &smooth {
+                    Some(smooth) => smooth.directions(places),
+                    None => self.faces.directions(places),
+                };
                 // SAFETY: every point of the input stands in one cube that is wanted and not divided.
                 unsafe { self.writer.write_lanes(points, four.len(), directions) };
             }
@@ -204,6 +214,13 @@ fn fade(x: Vec4) -> Vec4 {
     power
 }
 
+/// Where up to four points of a brick lie, against a centre, and the bits of their numbers.
+#[inline(always)]
+fn places(points: &[Placed], centre: Vec3) -> ([Vec4; 3], Vec4) {
+    let [x, y, z, numbers] = transposed(std::array::from_fn(|i| points[i.min(points.len() - 1)].lanes()));
+    ([x - centre.x, y - centre.y, z - centre.z], numbers)
+}
+
 /// The normal of a cube where all surfaces agree, as a linear function.
 struct Smooth {
     centre: Vec3,
@@ -212,13 +229,12 @@ struct Smooth {
 }
 
 impl Smooth {
-    /// The directions of the normals of up to four points, and the bits of their numbers.
+    /// The directions of the normals of four points.
     #[inline(never)]
-    fn directions(&self, points: &[Placed], cube: Vec3) -> ([Vec4; 3], Vec4) {
-        let centre = self.centre + cube;
-        let [x, y, z, numbers] = transposed(std::array::from_fn(|i| points[i.min(points.len() - 1)].lanes()));
+    fn directions(&self, [x, y, z]: [Vec4; 3]) -> [Vec4; 3] {
+        let centre = self.centre;
         let turns = times_lanes(self.turn, [x - centre.x, y - centre.y, z - centre.z]);
-        (std::array::from_fn(|axis| self.normal[axis] + turns[axis]), numbers)
+        std::array::from_fn(|axis| self.normal[axis] + turns[axis])
     }
 }
 

@@ -1,0 +1,383 @@
+//! Plane faces that meet in an edge or a corner: which those round a cube are, and what they say about its points.
+//!
+//! A surface fitted across an edge is none of its faces. Where two or three planes explain all points near a cube as well as
+//! the noise allows, they are fitted to these anew, each point counted for each plane as likely as it belongs to it: by
+//! expectation and maximization (Dempster, Laird and Rubin, "Maximum likelihood from incomplete data via the EM algorithm",
+//! Journal of the Royal Statistical Society B 39 (1977) 1-38).
+
+use super::around::Near;
+use super::choose::Chosen;
+use super::level::Level;
+use super::matrix::{Matrix, dot_lanes};
+use super::surface::plane_of;
+use crate::lanes::transposed;
+use crate::lattice::{BRICK, cube_centre};
+use crate::normals::SHORT;
+use crate::pca::Symmetric;
+use glam::{Vec3, Vec4};
+
+/// Faces at the most: hardly any corner has more.
+const MOST: usize = 3;
+
+/// A point lies at most so many deviations of the noise off its face, squared: of normal noise one in two thousand lies farther.
+const GATE: f32 = 12.0;
+
+/// So many of the cubes' centroids may be left that no face explains: where an edge goes through a cube it lies off both sides.
+const LEFT_CENTROIDS: f32 = 0.3;
+
+/// So many of the points.
+const LEFT: f32 = 0.03;
+
+/// A face explains at least so many of either.
+const LEAST: f32 = 0.05;
+
+/// No noise has a deviation of less than a thousandth of an edge.
+const FLOOR: f32 = 1e-6;
+
+/// Faces have hardly more noise than planes on one side of the edge.
+const FIT: f32 = 1.1;
+
+/// The cosine of the least angle between faces: at less one surface may be bent.
+const BLUNT: f32 = 0.8;
+
+/// A face ends at another if its centre lies so many deviations of its points off that, squared: it would be 1.7 of them, and 0
+/// if it went on beyond.
+const SIDE: f32 = 0.4;
+
+/// At first faces are fitted to about four times so many points.
+const SOME: usize = 64;
+
+/// `1 / (1 + exp(-1.702 x))` is nearly the share of the standard normal distribution below x.
+const LOGISTIC: f32 = 1.702;
+
+/// The likelihood of a point far from all faces: so the nearest one is the likeliest.
+const FAR: f32 = 1e-12;
+
+/// What is less likely than this counts for no face.
+const NEVER: f32 = 1e-3;
+
+/// Where a point of the cube itself is less likely, these are not all faces: it may be on a small body before them.
+const FOREIGN: f32 = 1e-6;
+
+/// An end that is nowhere.
+const NO_END: Vec4 = Vec4::new(0.0, 0.0, 0.0, 8.0);
+
+/// A plane, and where it ends.
+#[derive(Clone, Copy)]
+struct Face {
+    /// The unit normal, and the height of the origin: a point's height is their product with it and 1.
+    plane: Vec4,
+    /// The mean of its points, and their covariance.
+    centre: Vec3,
+    covariance: Matrix,
+    /// For each other face, in the same way, how far inside of that one the foot of a point on this one lies.
+    ends: [Vec4; MOST - 1],
+}
+
+impl Face {
+    fn new(normal: Vec3, centre: Vec3, covariance: Matrix) -> Self {
+        Self { plane: normal.extend(-normal.dot(centre)), centre, covariance, ends: [NO_END; MOST - 1] }
+    }
+
+    fn normal(&self) -> Vec3 {
+        self.plane.truncate()
+    }
+
+    /// The variance of its points in a direction.
+    fn spread(&self, along: Vec3) -> f32 {
+        self.covariance.times(along).dot(along)
+    }
+}
+
+/// The faces near a cube, against its centre, in edges.
+#[derive(Default)]
+pub(super) struct Faces {
+    all: Vec<Face>,
+    /// Variance of the points' distances from them.
+    noise: f32,
+    /// What they are to explain: each with a 1.
+    places: Vec<Vec4>,
+}
+
+impl Faces {
+    /// Finds the faces near the cube with bit `bit` of a brick, if there are two or three and nothing else.
+    #[optimize(size)]
+    #[inline(never)]
+    pub fn find(&mut self, level: &Level, bit: u32, near: &[Near], chosen: &[Chosen]) -> bool {
+        let noises = near.iter().map(|near| chosen[near.cube as usize].plane_noise);
+        // The harmonic mean over those that are planes, because a surface across an edge makes more.
+        let (mut planes, mut sum) = (0.0, 0.0);
+        for noise in noises.filter(|noise| *noise < f32::INFINITY) {
+            planes += 1.0;
+            sum += 1.0 / (noise + FLOOR);
+        }
+        let expected = planes / sum;
+        self.noise = expected;
+        if sum == 0.0 || !self.choose(near, chosen) {
+            return false;
+        }
+        let (centre, side) = (cube_centre(bit), BRICK as f32);
+        let mut own = 0..0;
+        self.places.clear();
+        for near in near {
+            // From the corner of that cube's brick to the centre of the own cube.
+            let shift = ((centre + near.step) / side).floor() * side - centre;
+            let start = self.places.len();
+            self.places.extend(level.points(near.cube as usize).iter().map(|p| (p.local + shift).extend(1.0)));
+            if near.step == Vec3::ZERO {
+                own = start..self.places.len();
+            }
+        }
+        let step = 1 + self.places.len() / (4 * SOME);
+        [step, step, 1].into_iter().all(|step| self.fit(step))
+            && self.noise <= FIT * expected
+            && self.places[own].iter().all(|place| {
+                let likelihoods = self.likelihoods([place.x, place.y, place.z].map(Vec4::splat));
+                likelihoods.into_iter().sum::<Vec4>().x > FOREIGN
+            })
+    }
+
+    /// Chooses among the surfaces of the cubes near by those that explain most of the cubes' centroids: the first face is a
+    /// plane where it was fitted, not so what is seen only near an edge.
+    #[optimize(size)]
+    #[inline(never)]
+    fn choose(&mut self, near: &[Near], chosen: &[Chosen]) -> bool {
+        let centroid = |near: &Near| near.step + chosen[near.cube as usize].quadric.centre;
+        self.places.clear();
+        self.places.extend(near.iter().map(|near| centroid(near).extend(1.0)));
+        let count = near.len() as f32;
+        let gate = GATE * self.noise;
+        let explains = |face: &Face, place: &Vec4| face.plane.dot(*place).powi(2) <= gate;
+        self.all.clear();
+        while self.all.len() < MOST && self.places.len() as f32 > LEFT * count {
+            let (mut best, mut most) = (None, (LEAST * count) as usize);
+            for near in near {
+                let surface = &chosen[near.cube as usize];
+                let quadric = &surface.quadric;
+                let limit = if self.all.is_empty() { surface.plane_noise } else { surface.error };
+                if limit == f32::INFINITY || self.all.iter().any(|other| is_blunt(other.normal(), quadric.slope)) {
+                    continue;
+                }
+                let foot = centroid(near) - quadric.height * quadric.slope;
+                let face = Face::new(quadric.slope, foot, Matrix::default());
+                let explained = self.places.iter().filter(|place| explains(&face, place)).count();
+                if explained > most {
+                    (best, most) = (Some(face), explained);
+                }
+            }
+            let Some(face) = best else { break };
+            self.places.retain(|place| !explains(&face, place));
+            self.all.push(face);
+        }
+        self.all.len() > 1 && self.places.len() as f32 <= LEFT_CENTROIDS * count
+    }
+
+    /// For each face the sums over each `step`th four places of their weights and of x, y, z, xx, yy, zz, yz, xz and xy: each
+    /// counts as likely as it is on that face. The last three may be left out.
+    #[inline(never)]
+    fn sums(&self, step: usize) -> [[Vec4; 10]; MOST] {
+        let mut sums = [[Vec4::ZERO; 10]; MOST];
+        for four in self.places.chunks_exact(4).step_by(step) {
+            let [x, y, z, _] = transposed([four[0], four[1], four[2], four[3]]);
+            let likelihoods = self.likelihoods([x, y, z]);
+            let unit = 1.0 / (likelihoods.into_iter().sum::<Vec4>() + NEVER);
+            for (likelihood, sums) in likelihoods.into_iter().zip(&mut sums).take(self.all.len()) {
+                let w = likelihood * unit;
+                let (wx, wy, wz) = (w * x, w * y, w * z);
+                let terms = [w, wx, wy, wz, wx * x, wy * y, wz * z, wy * z, wx * z, wx * y];
+                (0..10).for_each(|i| sums[i] += terms[i]);
+            }
+        }
+        sums
+    }
+
+    /// Fits every face to its share of each `step`th four places. Tells whether they are faces still.
+    #[optimize(size)]
+    #[inline(never)]
+    fn fit(&mut self, step: usize) -> bool {
+        let sums = self.sums(step);
+        let all = 4.0 * (self.places.len() / 4).div_ceil(step) as f32;
+        let (mut squares, mut count) = (0.0, 0.0);
+        for number in 0..self.all.len() {
+            let [points, sums @ ..] = sums[number].map(|sum| f64::from(sum.element_sum()));
+            if (points as f32) < (LEAST * all).max(10.0) {
+                return false;
+            }
+            let Some((mean, normal, covariance)) = plane_of(points, sums) else { return false };
+            let (mut normal, centre) = (normal.as_vec3(), mean.as_vec3());
+            if number > 0 {
+                // As on an arc from the first one.
+                let first = &self.all[0];
+                let across = centre - first.centre;
+                let (rise, drop) = (across.dot(first.normal()), across.dot(normal));
+                if across.length_squared() * first.normal().dot(normal) < 2.0 * rise * drop {
+                    normal = -normal;
+                }
+            }
+            let Symmetric { diagonal, off } = covariance;
+            let covariance = Matrix { diagonal: diagonal.as_vec3(), off: off.as_vec3() };
+            let face = Face::new(normal, centre, covariance);
+            squares += points as f32 * face.spread(normal);
+            count += points as f32;
+            self.all[number] = face;
+        }
+        if count < (1.0 - LEFT) * all {
+            return false;
+        }
+        self.noise = squares.max(0.0) / (count - 3.0 * self.all.len() as f32) + FLOOR;
+        for number in 0..self.all.len() {
+            let face = self.all[number];
+            for i in 1..self.all.len() {
+                let other = self.all[(number + i) % self.all.len()];
+                let (own, normal) = (face.normal(), other.normal());
+                if is_blunt(own, normal) {
+                    return false;
+                }
+                let drop = (face.centre - other.centre).dot(normal);
+                if drop * drop > SIDE * face.spread(normal) {
+                    let cosine = own.dot(normal);
+                    let unit = LOGISTIC / 16.0 / ((1.0 - cosine * cosine) * self.noise).sqrt();
+                    self.all[number].ends[i - 1] = (other.plane - cosine * face.plane) * unit.copysign(drop) + Vec4::W;
+                }
+            }
+        }
+        true
+    }
+
+    /// How likely points come from each face.
+    #[inline(never)]
+    fn likelihoods(&self, points: [Vec4; 3]) -> [Vec4; MOST] {
+        let mut likelihoods = [Vec4::ZERO; MOST];
+        for (likelihood, face) in likelihoods.iter_mut().zip(&self.all) {
+            let height = value(face.plane, points);
+            // (1 + x/n)^n for the exponential functions.
+            let root = 1.0 / (1.0 + height * height * (0.5 / 64.0 / self.noise));
+            let (mut inside, mut all) = (Vec4::ONE, Vec4::ONE);
+            for end in &face.ends[..self.all.len() - 1] {
+                let odds = power(value(*end, points).clamp(Vec4::splat(0.5), Vec4::splat(3.5)), 4);
+                inside *= odds;
+                all *= 1.0 + odds;
+            }
+            *likelihood = power(root, 6) * inside / all + FAR * root;
+        }
+        likelihoods
+    }
+
+    /// The directions of the normals of four points: between two faces as much of the way as the second one is likely, which
+    /// has the least mean square of the angle.
+    #[inline(never)]
+    pub fn directions(&self, points: [Vec4; 3]) -> [Vec4; 3] {
+        let likelihoods = self.likelihoods(points);
+        let unit = 1.0 / likelihoods.into_iter().sum::<Vec4>();
+        let mut sum = [Vec4::ZERO; 3];
+        for (face, likelihood) in self.all.iter().zip(likelihoods) {
+            let share = likelihood * unit;
+            // Nearly the sine of a share of a right angle.
+            let sine = share * (1.5 - 0.5 * share * share);
+            (0..3).for_each(|axis| sum[axis] += sine * face.plane[axis]);
+        }
+        // Amid a prism three may add up to nothing.
+        let is_long = dot_lanes(sum, sum).cmpgt(Vec4::splat(SHORT * SHORT));
+        std::array::from_fn(|axis| Vec4::select(is_long, sum[axis], Vec4::splat(self.all[0].plane[axis])))
+    }
+}
+
+/// Whether faces with these normals may be one bent surface.
+fn is_blunt(a: Vec3, b: Vec3) -> bool {
+    a.dot(b).abs() > BLUNT
+}
+
+/// A linear function at points.
+#[inline(always)]
+fn value(function: Vec4, [x, y, z]: [Vec4; 3]) -> Vec4 {
+    x * function.x + y * function.y + z * function.z + function.w
+}
+
+/// The power 2^`doublings`.
+#[inline(always)]
+fn power(mut base: Vec4, doublings: usize) -> Vec4 {
+    (0..doublings).for_each(|_| base *= base);
+    base
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points within two and a half edges, each where `place` puts what is drawn from a square of that half width, and off in all
+    /// directions by noise of a deviation.
+    fn faces(deviation: f32, normals: &[Vec3], place: impl Fn(usize, f32, f32) -> Vec3) -> Faces {
+        let mut state = 1u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / (1 << 23) as f32 - 1.0
+        };
+        let places = (0..4000)
+            .map(|i| {
+                let place = place(i, 2.5 * random(), 2.5 * random());
+                // The sum of twelve has a variance of four.
+                let noise = [(); 3].map(|()| 0.5 * deviation * (0..12).map(|_| random()).sum::<f32>());
+                (place + Vec3::from_array(noise)).extend(1.0)
+            })
+            .collect();
+        let all = normals.iter().map(|normal| Face::new(*normal, Vec3::ZERO, Matrix::default())).collect();
+        Faces { all, noise: deviation * deviation, places }
+    }
+
+    fn direction(faces: &Faces, x: f32, y: f32, z: f32) -> Vec3 {
+        Vec3::from_array(faces.directions([x, y, z].map(Vec4::splat)).map(|lanes| lanes.x)).normalize()
+    }
+
+    /// The edge of a block, along y, from planes that are six degrees off.
+    #[test]
+    fn faces_are_found_in_noise_and_end_at_each_other() {
+        let block = |i: usize, a: f32, b: f32| {
+            if i.is_multiple_of(2) { Vec3::new(-a.abs(), b, 0.0) } else { Vec3::new(0.0, b, -a.abs()) }
+        };
+        let off = [Vec3::new(0.1, 0.0, 1.0).normalize(), Vec3::new(1.0, -0.1, 0.0).normalize()];
+        let mut faces = faces(0.1, &off, block);
+        assert!((0..3).all(|_| faces.fit(1)));
+        let [top, side] = [0, 1].map(|i| faces.all[i].normal());
+        assert!(top.dot(Vec3::Z) > 0.9999 && side.dot(Vec3::X) > 0.9999, "{top}, {side}");
+        assert!((faces.noise / 0.01 - 1.0).abs() < 0.1, "{}", faces.noise);
+        let tilt = |x: f32, z: f32| direction(&faces, x, 0.3, z).angle_between(Vec3::Z).to_degrees();
+        assert!(tilt(-1.0, 0.1) < 3.0 && tilt(0.1, -1.0) > 87.0);
+        assert!((tilt(0.0, 0.0) - 45.0).abs() < 3.0);
+        // Past the end of the top, though as near to its plane as to the side's.
+        assert!(tilt(0.15, -0.15) > 60.0 && tilt(-0.15, 0.15) < 30.0, "{} {}", tilt(0.15, -0.15), tilt(-0.15, 0.15));
+        // Far from all of them the nearest one.
+        assert!(tilt(-9.0, 3.0) < 20.0 && tilt(3.0, -9.0) > 70.0);
+    }
+
+    /// A wall on a floor: the floor goes on behind it.
+    #[test]
+    fn faces_go_on_beyond_others() {
+        let floor = |i: usize, a: f32, b: f32| {
+            if i.is_multiple_of(3) { Vec3::new(0.0, b, a.abs()) } else { Vec3::new(a, b, 0.0) }
+        };
+        let mut faces = faces(0.02, &[Vec3::Z, Vec3::X], floor);
+        assert!((0..3).all(|_| faces.fit(1)));
+        assert_eq!(faces.all[0].ends[0], NO_END);
+        assert_ne!(faces.all[1].ends[0], NO_END);
+        for x in [-2.0, -0.3, 0.3, 2.0] {
+            assert!(direction(&faces, x, 0.0, 0.01).z.abs() > 0.999, "{x}");
+        }
+        assert!(direction(&faces, 0.01, 0.0, 1.0).x.abs() > 0.999);
+    }
+
+    #[test]
+    fn what_is_bent_is_no_two_planes() {
+        let tube = |_: usize, a: f32, b: f32| Vec3::new(2.0 * a.sin(), b, 2.0 * a.cos() - 1.0);
+        let mut faces = faces(0.05, &[Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.6, 0.0, 0.8)], tube);
+        assert!(!(0..3).all(|_| faces.fit(1)) || faces.noise > 2.0 * FIT * 0.0025);
+    }
+
+    /// Amid three planes whose normals add up to nothing there still is one.
+    #[test]
+    fn directions_never_vanish() {
+        let normals =
+            [0.0f32, 120.0, 240.0].map(|angle| Vec3::new(angle.to_radians().cos(), angle.to_radians().sin(), 0.0));
+        let faces = faces(0.1, &normals, |_, a, b| Vec3::new(a, b, 0.0));
+        assert!((direction(&faces, 0.0, 0.0, 0.0).length() - 1.0).abs() < 1e-5);
+    }
+}
