@@ -2,6 +2,7 @@
 
 use crate::bricks::{Bricks, OUTSIDE, set_bits};
 use crate::error::Error;
+use crate::lanes::transposed;
 use crate::lattice::{cube_centre, octant_in_brick};
 use crate::lists::reserve;
 use crate::parallel::{self, Filling, Scatter};
@@ -35,6 +36,13 @@ impl Placed {
     pub fn lanes(self) -> Vec4 {
         bytemuck::cast(self)
     }
+}
+
+/// Where up to four points of a brick lie, against a place in it, and the bits of their numbers. The last one fills up.
+#[inline(always)]
+pub(crate) fn located(points: &[Placed], place: Vec3) -> ([Vec4; 3], Vec4) {
+    let [x, y, z, numbers] = transposed(std::array::from_fn(|i| points[i.min(points.len() - 1)].lanes()));
+    ([x - place.x, y - place.y, z - place.z], numbers)
 }
 
 /// The cubes that hold points, brick by brick, and their points, cube by cube.

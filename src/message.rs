@@ -1,4 +1,4 @@
-//! The texts of errors, from pieces: a browser loads a fortieth less without the library's formatting.
+//! The texts of errors, from pieces: a browser loads a KiB less without the library's formatting.
 
 /// What goes into a text.
 pub(crate) trait Piece {

@@ -26,7 +26,7 @@ pub(super) struct Chosen {
     pub variation: f32,
     /// The noise again, if the surface is thin against its width, so that its noise can be compared; infinite if not.
     pub flat_noise: f32,
-    /// The noise again, if the surface is a plane wherever cubes near by ask for it; infinite if not.
+    /// The noise again, if the surface is a plane for two and a half edges; infinite if not.
     pub plane_noise: f32,
     /// How often the edge was doubled.
     pub doublings: u32,
@@ -67,8 +67,8 @@ const MISFIT: f32 = 2.0;
 /// A neighbourhood is flat when it is so many times as wide as thick, squared.
 const FLAT: f32 = 2.0;
 
-/// A surface is plane if what it bends away from one, at the farthest cubes near it, is less than this share of its noise, or
-/// less than so much, both squared.
+/// A surface is a plane if what it bends away from one, two and a half edges away, is less than this share of its noise and so
+/// much more, all squared.
 const SAG: f32 = 0.5;
 const FLAT_SAG: f32 = 5e-7;
 
@@ -136,7 +136,6 @@ fn of_cube(levels: &[Level], mut cube: IVec3, centroid: Vec3) -> Chosen {
             let quadric = Quadric { centre: centroid, height: height * scale * edge, slope: normal, bend };
             let flat_noise = if is_flat { noise } else { f32::INFINITY };
             let variation = surface.variation;
-            // Two and a half edges away.
             let sag = bend.square() * (3.125 * 3.125);
             let is_plane = is_flat && !surface.lacks_detail && sag <= SAG * noise + FLAT_SAG;
             let plane_noise = if is_plane { noise } else { f32::INFINITY };

@@ -8,7 +8,7 @@ use super::matrix::{dot_lanes, times_lanes};
 use super::tally::Tally;
 use super::{DIVISIONS, WHAT};
 use crate::error::Error;
-use crate::grid::Placed;
+use crate::grid::located;
 use crate::lanes::{inverse_root, load, root, transposed};
 use crate::lattice::cube_centre;
 use crate::normals::{Normals, SHORT, Writer};
@@ -145,14 +145,16 @@ impl<'a> Task<'a> {
             if !is_edge && can_divide && IN_NOISE * in_noise < near.len() {
                 return Role::Wanted;
             }
-            let noises = near.iter().map(|near| chosen[near.cube as usize].flat_noise);
-            self.ballot.invite(near, chosen, quartile(noises));
+            if !is_edge {
+                let noises = near.iter().map(|near| chosen[near.cube as usize].flat_noise);
+                self.ballot.invite(near, chosen, quartile(noises));
+            }
         }
         let placed = level.points(cube);
         let centre = cube_centre(bit);
         if is_edge || smooth.is_some() {
             for four in placed.chunks(4) {
-                let (places, points) = places(four, centre);
+                let (places, points) = located(four, centre);
                 let directions = match &smooth {
                     Some(smooth) => smooth.directions(places),
                     None => self.faces.directions(places),
@@ -173,7 +175,7 @@ impl<'a> Task<'a> {
             }
         }
         let count = placed.len() as u64;
-        if !self.ballot.voters.is_empty() {
+        if is_edge || !self.ballot.voters.is_empty() {
             self.resolved += count;
         }
         if own.is_some() {
@@ -212,13 +214,6 @@ fn fade(x: Vec4) -> Vec4 {
         power *= power;
     }
     power
-}
-
-/// Where up to four points of a brick lie, against a centre, and the bits of their numbers.
-#[inline(always)]
-fn places(points: &[Placed], centre: Vec3) -> ([Vec4; 3], Vec4) {
-    let [x, y, z, numbers] = transposed(std::array::from_fn(|i| points[i.min(points.len() - 1)].lanes()));
-    ([x - centre.x, y - centre.y, z - centre.z], numbers)
 }
 
 /// The normal of a cube where all surfaces agree, as a linear function.
