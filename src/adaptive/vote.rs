@@ -140,12 +140,12 @@ impl<'a> Task<'a> {
         if smooth.is_none() {
             let near = self.around.near(&level.grid, brick, bit, 2);
             is_edge = has_many && self.faces.find(level, bit, near, chosen);
-            // Else noise hides what the parts could tell, also of an edge in this very cube.
-            let in_noise = near.iter().filter(|near| level.surfaces[near.cube as usize].is_plane_in_noise).count();
-            if !is_edge && can_divide && IN_NOISE * in_noise < near.len() {
-                return Role::Wanted;
-            }
             if !is_edge {
+                // Else noise hides what the parts could tell, also of an edge in this very cube.
+                let in_noise = near.iter().filter(|near| level.surfaces[near.cube as usize].is_plane_in_noise).count();
+                if can_divide && IN_NOISE * in_noise < near.len() {
+                    return Role::Wanted;
+                }
                 let noises = near.iter().map(|near| chosen[near.cube as usize].flat_noise);
                 self.ballot.invite(near, chosen, quartile(noises));
             }
