@@ -116,8 +116,9 @@ impl Faces {
             return false;
         }
         let (centre, side) = (cube_centre(bit), BRICK as f32);
+        let count: usize = near.iter().map(|near| level.points(near.cube as usize).len()).sum();
+        let stride = 1 + count / MANY;
         let mut own = &[][..];
-        let stride = 1 + near.iter().map(|near| level.points(near.cube as usize).len()).sum::<usize>() / MANY;
         self.places.clear();
         for near in near {
             // From the corner of that cube's brick to the centre of the own cube.
@@ -172,9 +173,8 @@ impl Faces {
         self.all.len() > 1 && self.places.len() as f32 <= LEFT_CENTROIDS * count
     }
 
-    /// For each face the sums over each `stride`th four places of their weights, of x, y, z, xx, yy, zz, yz, xz and xy, and of their
-    /// square heights: each
-    /// counts as likely as it is on that face. The last three may be left out.
+    /// For each face the sums over each `stride`th four places of their weights, of x, y, z, xx, yy, zz, yz, xz and xy, and of
+    /// their square heights: a place weighs as much as it is likely to be on that face. The last three may be left out.
     #[inline(never)]
     fn sums(&self, stride: usize) -> [[Vec4; 11]; MOST] {
         let mut sums = [[Vec4::ZERO; 11]; MOST];
@@ -198,11 +198,11 @@ impl Faces {
     #[inline(never)]
     fn fit(&mut self, stride: usize) -> bool {
         let sums = self.sums(stride);
-        let all = 4.0 * (self.places.len() / 4).div_ceil(stride) as f32;
+        let total = 4.0 * (self.places.len() / 4).div_ceil(stride) as f32;
         let (mut squares, mut count) = (0.0, 0.0);
         for number in 0..self.all.len() {
             let [points, sums @ .., square] = sums[number].map(|sum| f64::from(sum.element_sum()));
-            if (points as f32) < (LEAST * all).max(10.0) {
+            if (points as f32) < (LEAST * total).max(10.0) {
                 return false;
             }
             let Some((mean, normal, covariance)) = plane_of(points, sums) else { return false };
@@ -224,7 +224,7 @@ impl Faces {
             count += points as f32;
             self.all[number] = face;
         }
-        if count < (1.0 - LEFT) * all {
+        if count < (1.0 - LEFT) * total {
             return false;
         }
         self.noise = squares / (count - 3.0 * self.all.len() as f32) + FLOOR;
