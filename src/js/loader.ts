@@ -86,15 +86,15 @@ async function compile({ wasmUrl, full }: Start, build: string, own: () => URL, 
 }
 
 /**
- * Shared memory is reserved at its maximum, and some engines refuse a large one: steps down until one is granted. Less a page,
- * because lol_alloc loses blocks that end where addresses do.
+ * Shared memory is reserved at its maximum, and some engines refuse a large one: steps down until one is granted. Not the last
+ * page of all, because lol_alloc loses blocks that end where addresses do.
  */
 function createMemory({ memoryMaxMiB = 4096 }: Start, shared: boolean) {
-  for (let maximum = memoryMaxMiB * 16 - 1; ; maximum = Math.floor(maximum / 2)) {
+  for (let maximum = Math.min(memoryMaxMiB * 16, 65535); ; maximum = Math.ceil(maximum / 2)) {
     try {
       return [new WebAssembly.Memory({ initial: initialPages, maximum, shared }), maximum] as const;
     } catch (error) {
-      if (maximum / 2 < leastMiB * 16 - 1) throw error;
+      if (maximum / 2 < leastMiB * 16) throw error;
     }
   }
 }
