@@ -3,7 +3,7 @@
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::frame::Frame;
-use crate::grid::{Grid, Placed, octants};
+use crate::grid::{Grid, Placed, located, octants};
 use crate::lanes::transposed;
 use crate::lattice::cube_centre;
 use crate::nodes::Node;
@@ -237,10 +237,7 @@ impl<'a> Cube<'a> {
                 unsafe { octant.write_variations(points, u, v, writer) };
             }
             for four in points.chunks(4) {
-                // Where there are fewer, the last stands in for the others.
-                let rows = std::array::from_fn(|i| four[i.min(four.len() - 1)].lanes());
-                let [x, y, z, numbers] = transposed(rows);
-                let places = [x, y, z];
+                let (places, numbers) = located(four, Vec3::ZERO);
                 // SAFETY: as above.
                 unsafe { writer.write_lanes(numbers, four.len(), octant.normals(places[u], places[v], self.own)) };
             }
