@@ -22,6 +22,13 @@ pub(crate) fn root(lanes: Vec4) -> Vec4 {
     bytemuck::cast(f32x4::from_array(lanes.to_array()).sqrt().to_array())
 }
 
+/// Each lane to the power of 2^`doublings`: of `1 + x / 2^doublings` nearly `exp(x)`, and the same bits everywhere.
+#[inline(always)]
+pub(crate) fn power(mut lanes: Vec4, doublings: usize) -> Vec4 {
+    (0..doublings).for_each(|_| lanes *= lanes);
+    lanes
+}
+
 /// One over the square root of each lane.
 #[inline(always)]
 pub(crate) fn inverse_root(lanes: Vec4) -> Vec4 {

@@ -11,7 +11,7 @@ use super::level::Level;
 use super::matrix::{Matrix, dot_lanes};
 use super::surface::plane_of;
 use crate::grid::located;
-use crate::lanes::transposed;
+use crate::lanes::{power, transposed};
 use crate::lattice::{BRICK, cube_centre};
 use crate::normals::SHORT;
 use crate::pca::Symmetric;
@@ -253,7 +253,6 @@ impl Faces {
         let mut likelihoods = [Vec4::ZERO; MOST];
         for (likelihood, face) in likelihoods.iter_mut().zip(&self.all) {
             let height = value(face.plane, points);
-            // (1 + x/n)^n for the exponential functions.
             let root = 1.0 / (1.0 + height * height * (0.5 / 64.0 / self.noise));
             let (mut inside, mut all) = (Vec4::ONE, Vec4::ONE);
             for end in &face.ends[..self.all.len() - 1] {
@@ -294,13 +293,6 @@ fn is_blunt(a: Vec3, b: Vec3) -> bool {
 #[inline(always)]
 fn value(function: Vec4, [x, y, z]: [Vec4; 3]) -> Vec4 {
     x * function.x + y * function.y + z * function.z + function.w
-}
-
-/// The power 2^`doublings`.
-#[inline(always)]
-fn power(mut base: Vec4, doublings: usize) -> Vec4 {
-    (0..doublings).for_each(|_| base *= base);
-    base
 }
 
 #[cfg(test)]

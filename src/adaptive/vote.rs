@@ -9,7 +9,7 @@ use super::tally::Tally;
 use super::{DIVISIONS, WHAT};
 use crate::error::Error;
 use crate::grid::located;
-use crate::lanes::{inverse_root, load, root, transposed};
+use crate::lanes::{inverse_root, load, power, root, transposed};
 use crate::lattice::cube_centre;
 use crate::normals::{Normals, SHORT, Writer};
 use crate::parallel::Filling;
@@ -209,11 +209,7 @@ fn quartile(values: impl Iterator<Item = f32> + Clone) -> f32 {
 /// `exp(-x)`, nearly, and below zero more than that: the same bits everywhere. Zero from some 10,000; not for -16 and less.
 #[inline(always)]
 fn fade(x: Vec4) -> Vec4 {
-    let mut power = Vec4::ONE / (1.0 + x * (1.0 / 16.0));
-    for _ in 0..4 {
-        power *= power;
-    }
-    power
+    power(Vec4::ONE / (1.0 + x * (1.0 / 16.0)), 4)
 }
 
 /// The normal of a cube where all surfaces agree, as a linear function.
