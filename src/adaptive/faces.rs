@@ -130,7 +130,7 @@ impl Faces {
             }
         }
         let stride = 1 + self.places.len() / SOME;
-        [stride, stride, 1].into_iter().all(|stride| self.fit(stride))
+        [stride, stride, 1].into_iter().all(|stride| self.fit(stride) && self.end())
             && self.noise <= FIT * expected
             && own.chunks(4).all(|four| {
                 let likelihoods = self.likelihoods(located(four, centre).0);
@@ -155,8 +155,9 @@ impl Faces {
             for near in near {
                 let surface = &chosen[near.cube as usize];
                 let quadric = &surface.quadric;
-                let limit = if self.all.is_empty() { surface.plane_noise } else { surface.error };
-                if limit == f32::INFINITY || self.all.iter().any(|other| is_blunt(other.normal(), quadric.slope)) {
+                let may_be_face =
+                    if self.all.is_empty() { surface.plane_noise < f32::INFINITY } else { surface.is_some() };
+                if !may_be_face || self.all.iter().any(|other| is_blunt(other.normal(), quadric.slope)) {
                     continue;
                 }
                 let foot = centroid(near) - quadric.height * quadric.slope;
@@ -193,7 +194,7 @@ impl Faces {
         sums
     }
 
-    /// Fits every face to its share of each `stride`th four places. Tells whether they are faces still.
+    /// Fits every face to its share of each `stride`th four places. Tells whether they explain them still.
     #[optimize(size)]
     #[inline(never)]
     fn fit(&mut self, stride: usize) -> bool {
@@ -224,10 +225,14 @@ impl Faces {
             count += points as f32;
             self.all[number] = face;
         }
-        if count < (1.0 - LEFT) * total {
-            return false;
-        }
         self.noise = squares / (count - 3.0 * self.all.len() as f32) + FLOOR;
+        count >= (1.0 - LEFT) * total
+    }
+
+    /// Ends every face at those others that it lies on one side of. Tells whether no two of them may be one surface.
+    #[optimize(size)]
+    #[inline(never)]
+    fn end(&mut self) -> bool {
         for number in 0..self.all.len() {
             let face = self.all[number];
             for i in 1..self.all.len() {
@@ -253,9 +258,11 @@ impl Faces {
         let mut likelihoods = [Vec4::ZERO; MOST];
         for (likelihood, face) in likelihoods.iter_mut().zip(&self.all) {
             let height = value(face.plane, points);
+            // Of 64 the root, and of 16 the odds: see `power`.
             let root = 1.0 / (1.0 + height * height * (0.5 / 64.0 / self.noise));
             let (mut inside, mut all) = (Vec4::ONE, Vec4::ONE);
             for end in &face.ends[..self.all.len() - 1] {
+                // From one in 65,536 to 500 million to one: what lies farther off either way is as sure.
                 let odds = power(value(*end, points).clamp(Vec4::splat(0.5), Vec4::splat(3.5)), 4);
                 inside *= odds;
                 all *= 1.0 + odds;
@@ -331,7 +338,7 @@ mod tests {
         };
         let off = [Vec3::new(0.1, 0.0, 1.0).normalize(), Vec3::new(1.0, -0.1, 0.0).normalize()];
         let mut faces = faces(0.1, &off, block);
-        assert!((0..3).all(|_| faces.fit(1)));
+        assert!((0..3).all(|_| faces.fit(1) && faces.end()));
         let [top, side] = [0, 1].map(|i| faces.all[i].normal());
         assert!(top.dot(Vec3::Z) > 0.9999 && side.dot(Vec3::X) > 0.9999, "{top}, {side}");
         assert!((faces.noise / 0.01 - 1.0).abs() < 0.1, "{}", faces.noise);
@@ -349,7 +356,7 @@ mod tests {
             if i.is_multiple_of(3) { Vec3::new(0.0, b, a.abs()) } else { Vec3::new(a, b, 0.0) }
         };
         let mut faces = faces(0.02, &[Vec3::Z, Vec3::X], floor);
-        assert!((0..3).all(|_| faces.fit(1)));
+        assert!((0..3).all(|_| faces.fit(1) && faces.end()));
         assert_eq!(faces.all[0].ends[0], NO_END);
         assert_ne!(faces.all[1].ends[0], NO_END);
         for x in [-2.0, -0.3, 0.3, 2.0] {
@@ -362,7 +369,7 @@ mod tests {
     fn what_is_bent_is_no_two_planes() {
         let tube = |_: usize, a: f32, b: f32| Vec3::new(2.0 * a.sin(), b, 2.0 * a.cos() - 1.0);
         let mut faces = faces(0.2, &[Vec3::new(0.7, 0.0, 0.7), Vec3::new(-0.7, 0.0, 0.7)], tube);
-        assert!(!faces.fit(1) || !faces.fit(1) || faces.noise > FIT * 0.04);
+        assert!(!(faces.fit(1) && faces.end() && faces.fit(1)) || faces.noise > FIT * 0.04);
         // With less noise they do not even explain the points.
         let explained = |faces: &Faces| faces.sums(1).map(|sums| sums[0].element_sum()).iter().sum::<f32>() / 4000.0;
         faces.noise = 0.0025;
