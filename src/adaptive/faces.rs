@@ -304,16 +304,13 @@ fn value(function: Vec4, [x, y, z]: [Vec4; 3]) -> Vec4 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::surface::tests::uniform;
     use super::*;
 
     /// Points within two and a half edges, each where `place` puts what is drawn from a square of that half width, and off in all
     /// directions by noise of a deviation.
     fn faces(deviation: f32, normals: &[Vec3], place: impl Fn(usize, f32, f32) -> Vec3) -> Faces {
-        let mut state = 1u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / (1 << 23) as f32 - 1.0
-        };
+        let mut random = uniform();
         let places = (0..4000)
             .map(|i| {
                 let place = place(i, 2.5 * random(), 2.5 * random());

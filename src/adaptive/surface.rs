@@ -395,7 +395,7 @@ fn principal(covariance: &Symmetric, normal: DVec3) -> (Vec3, Vec3, [f64; 3]) {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::samples::{Sample, Window};
     use super::*;
 
@@ -411,7 +411,7 @@ mod tests {
     }
 
     /// Numbers from -1 to 1.
-    fn uniform() -> impl FnMut() -> f32 {
+    pub fn uniform() -> impl FnMut() -> f32 {
         let mut state = 1u32;
         move || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
