@@ -3,32 +3,15 @@
 //! Usage: `cargo bench --bench native -- FILE CELL RUNS THREADS`, with CELL `auto` or a multiple of L. Prints one JSON
 //! object a run on standard output, after one run that is not counted.
 
+#[path = "../tests/common/memory.rs"]
+#[allow(dead_code)] // It is for tests, too.
+mod memory;
+
 use bilinormal::{Cell, Options, Points, Progress, estimate};
-use std::alloc::{GlobalAlloc, Layout, System};
+use memory::{CURRENT, PEAK};
 use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
 use std::time::Instant;
-
-static USED: AtomicUsize = AtomicUsize::new(0);
-static PEAK: AtomicUsize = AtomicUsize::new(0);
-
-struct Counting;
-
-// SAFETY: passes every call on to the system's allocator.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        PEAK.fetch_max(USED.fetch_add(layout.size(), Relaxed) + layout.size(), Relaxed);
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
-        USED.fetch_sub(layout.size(), Relaxed);
-        unsafe { System.dealloc(block, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Cargo adds an argument of its own at the end.
@@ -47,7 +30,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let clock = || start.elapsed().as_secs_f64() * 1e3;
     let go_on = |_: &'static str, _: f64| ControlFlow::Continue(());
     for run in 0..=runs.parse()? {
-        PEAK.store(USED.load(Relaxed), Relaxed);
+        PEAK.store(CURRENT.load(Relaxed), Relaxed);
         let begin = clock();
         let report = pool.install(|| estimate(&points, &options, &Progress::new(&go_on, &clock)))?.report;
         let total = clock() - begin;

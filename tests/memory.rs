@@ -2,52 +2,18 @@
 #![cfg(not(target_arch = "wasm32"))]
 
 mod common;
+#[path = "common/memory.rs"]
+mod counter;
 
 use bilinormal::ply::{self, Additions};
 use bilinormal::{Cell, Error, Options, Orient, Points, Progress, estimate_owned};
 use common::*;
-use std::alloc::{GlobalAlloc, Layout, System};
+use counter::{CURRENT, FREE, LIMIT, REFUSED, peak_of};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::atomic::Ordering::Relaxed;
 
-static CURRENT: AtomicUsize = AtomicUsize::new(0);
-static PEAK: AtomicUsize = AtomicUsize::new(0);
-/// What may be in use at once.
-static LIMIT: AtomicUsize = AtomicUsize::new(usize::MAX);
-/// No such block is refused: the library need not expect that.
-const SMALL: usize = 1 << 16;
-/// The last block that was refused, and what was free then.
-static REFUSED: AtomicUsize = AtomicUsize::new(0);
-static FREE: AtomicUsize = AtomicUsize::new(0);
 /// One test at a time, because the counters are those of the process.
 static ALONE: Mutex<()> = Mutex::new(());
-
-struct Counting;
-
-// A block grows by a copy, for `realloc` is the default one: as it is in WebAssembly.
-// SAFETY: passes every call that it does not refuse on to the system's allocator.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let before = CURRENT.fetch_add(layout.size(), Relaxed);
-        let now = before + layout.size();
-        if now > LIMIT.load(Relaxed) && layout.size() > SMALL {
-            CURRENT.fetch_sub(layout.size(), Relaxed);
-            REFUSED.store(layout.size(), Relaxed);
-            FREE.store(LIMIT.load(Relaxed).saturating_sub(before), Relaxed);
-            return std::ptr::null_mut();
-        }
-        PEAK.fetch_max(now, Relaxed);
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        CURRENT.fetch_sub(layout.size(), Relaxed);
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn peak_bytes_a_point() {
@@ -85,11 +51,10 @@ fn peak_bytes_a_point() {
         ("signs with a stray point", &stray(3e6), Cell::Auto, consistent, 54),
         ("signs in a solid, where patches are many", &noisy, Cell::Scale(1.5), consistent, 215),
     ] {
-        let before = CURRENT.load(Relaxed);
-        PEAK.store(before, Relaxed);
         let options = Options { cell, orient, ..Options::default() };
-        let result = estimate_owned(Points::from_vec(points.clone()).unwrap(), &options, &Progress::silent()).unwrap();
-        let peak = PEAK.load(Relaxed) - before;
+        let (result, peak) = peak_of(|| {
+            estimate_owned(Points::from_vec(points.clone()).unwrap(), &options, &Progress::silent()).unwrap()
+        });
         let each = peak / (points.len() / 3);
         println!("{name}: {each} bytes a point, {} cubes", result.report.cells);
         assert!(each <= bound, "{name}: {each} bytes a point");

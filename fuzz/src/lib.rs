@@ -2,6 +2,7 @@
 
 pub mod clouds;
 pub mod estimates;
+#[path = "../../tests/common/memory.rs"]
 mod memory;
 pub mod ply;
 mod random;
