@@ -16,8 +16,12 @@ interface PoolBuilder {
 export const pool: { start?: StartWorker; channel: string; kept?: unknown } = { channel: '' };
 
 /** Starts the threads, waits until all of them are ready to take work, and lets rayon hand it to them. */
-export async function startWorkers(module: WebAssembly.Module, memory: WebAssembly.Memory, builder: PoolBuilder) {
-  const boot: ThreadBoot = { module, memory, receiver: builder.receiver(), channel: pool.channel };
+export async function startWorkers(
+  module_or_path: WebAssembly.Module,
+  memory: WebAssembly.Memory,
+  builder: PoolBuilder,
+) {
+  const boot: ThreadBoot = { module_or_path, memory, receiver: builder.receiver(), channel: pool.channel };
   const links: Link[] = [];
   let waiting = builder.numThreads();
   let timer;

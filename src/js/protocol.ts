@@ -55,9 +55,9 @@ export type Reply = { phase: string; fraction: number } | { failure: Failure } |
 /** Which build runs, as it enters the report. */
 export type Mode = Pick<Report, 'mode' | 'threads' | 'fallbackReason'>;
 
-/** What one thread of the pool needs. */
+/** What one thread of the pool needs; the glue takes the first two. */
 export interface ThreadBoot {
-  module: WebAssembly.Module;
+  module_or_path: WebAssembly.Module;
   memory: WebAssembly.Memory;
   receiver: number;
   channel: string;

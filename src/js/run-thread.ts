@@ -6,7 +6,10 @@ export async function runThread(boot: ThreadBoot, answer: (reason?: string) => v
   let tell = answer;
   try {
     const glue: ThreadsGlue = await import('./threads/bilinormal.js' as string);
-    await glue.default({ module_or_path: boot.module, memory: boot.memory });
+    // V8 (Node 20) tells a thread of growth only once it has registered the memory that it was handed. Of what grew just before,
+    // as for the stacks of other threads, this tells it: else bulk copies there would be out of bounds.
+    boot.memory.grow(0);
+    await glue.default(boot);
     answer();
     // The worker that owns this thread waits inside wasm from now on and hears nothing: tell the calling thread.
     tell = (reason) => new BroadcastChannel(boot.channel).postMessage(reason);
