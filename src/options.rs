@@ -65,7 +65,8 @@ pub enum Orient {
     None,
     /// One sign for each connected surface: outwards if it is closed, else towards what stands before it; if nothing does, away
     /// from its middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal. For anything; [`crate::Report::components`]
-    /// tells how sure it is.
+    /// tells how sure it is. In noise also the lines of normals change with [`Method::Bilinear`] and [`Cell::Auto`], where surfaces
+    /// face apart within it: there a mean of normals with their signs is right more often.
     Consistent,
     /// The same for surfaces that are closed. Of others every part is turned to what it sees of the open, even if that makes an
     /// edge of its own, and to nothing that stands before it: for heaps of parts, and objects with holes.

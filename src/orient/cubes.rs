@@ -20,14 +20,23 @@ const LARGEST_NOISE: f32 = 0.28;
 const ENLARGEMENT: f32 = 1.25;
 const LARGEST: f32 = ENLARGEMENT * ENLARGEMENT * ENLARGEMENT;
 
-/// The cubes, and the noise in their edges. Sorts the points once, noisy ones twice.
+/// The points in their cubes.
+pub(super) struct Cubes {
+    pub grid: Grid,
+    /// The edge of a cube, in units of the positions.
+    pub edge: f64,
+    /// How far points lie off their surface, in edges.
+    pub noise: f32,
+}
+
+/// Sorts the points once, noisy ones twice.
 pub(super) fn sort(
     points: &Points,
     normals: &[Vec3],
     bounds: &Bounds,
     density: &Density,
     stage: &Stage,
-) -> Result<(Grid, f32), Error> {
+) -> Result<Cubes, Error> {
     let sort = |edge: f64, stage: &Stage| {
         let lattice = Lattice::new(bounds, &|| density.middle, edge, CUBES);
         Ok(Grid::sort(&Source::new(points, lattice), stage, |_, _| ())?.0)
@@ -36,7 +45,7 @@ pub(super) fn sort(
     let grid = sort(edge, &stage.part(0.0..0.5))?;
     let found = noise(&grid, normals, 1.0);
     if found <= LARGEST_NOISE {
-        return Ok((grid, found));
+        return Ok(Cubes { grid, edge, noise: found });
     }
     let mut scale = ENLARGEMENT;
     // The largest are taken whatever their noise.
@@ -44,9 +53,10 @@ pub(super) fn sort(
         scale *= ENLARGEMENT;
     }
     drop(grid);
-    let grid = sort(f64::from(scale) * edge, &stage.part(0.5..1.0))?;
-    let found = noise(&grid, normals, 1.0);
-    Ok((grid, found))
+    let edge = f64::from(scale) * edge;
+    let grid = sort(edge, &stage.part(0.5..1.0))?;
+    let noise = noise(&grid, normals, 1.0);
+    Ok(Cubes { grid, edge, noise })
 }
 
 /// How far points lie off their surface, in edges: the deviation that half of some cubes do not exceed. The cubes are those of

@@ -3,7 +3,8 @@
 //! `docs/orientation.md` explains the rule, its sources and its limits. In short: the points of each small cube are parted
 //! into patches ([`patches`]), a patch and those round it say whether their signs agree ([`links`]), which sides of a patch
 //! are open to the air says which way is out ([`air`]), and the signs are chosen that these agree with best ([`groups`]), of
-//! open surfaces also what their parts see of each other ([`looks`]). These then face what stands before them ([`facing`]).
+//! open surfaces also what their parts see of each other ([`looks`]). These then face what stands before them ([`facing`]). In
+//! noise normals then become means of those about them ([`means`]).
 
 mod air;
 mod components;
@@ -12,6 +13,7 @@ mod facing;
 mod groups;
 mod links;
 mod looks;
+mod means;
 mod patches;
 mod signs;
 
@@ -21,11 +23,12 @@ use crate::cell::Density;
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::lists::filled;
-use crate::options::{Options, Orient};
+use crate::options::{Cell, Method, Options, Orient};
 use crate::parallel::{self, Scatter};
 use crate::points::{Bounds, CHUNK, Points};
 use crate::progress::Stage;
 use components::decide;
+use cubes::Cubes;
 use glam::{DVec3, Vec3};
 use groups::Groups;
 use links::Links;
@@ -102,25 +105,29 @@ fn surfaces(
     options: &Options,
     stage: &Stage,
 ) -> Result<Surfaces, Error> {
-    let (mut grid, noise) = cubes::sort(points, normals, bounds, density, &stage.part(0.0..0.35))?;
-    let (patches, members) = Patches::of(&grid, normals, noise, &stage.part(0.35..0.5))?;
+    let mut cubes = cubes::sort(points, normals, bounds, density, &stage.part(0.0..0.35))?;
+    let Cubes { grid, noise, .. } = &mut cubes;
+    let (patches, members) = Patches::of(grid, normals, *noise, &stage.part(0.35..0.5))?;
     // Half of all the memory, and only its order is needed from here on.
     grid.placed = Vec::new();
-    let sights = air::sights(&grid, &patches, points.len(), &stage.part(0.5..0.55))?;
-    let links = Links::of(&grid, &patches, noise, &stage.part(0.55..0.7))?;
+    let sights = air::sights(grid, &patches, points.len(), &stage.part(0.5..0.55))?;
+    let links = Links::of(grid, &patches, *noise, &stage.part(0.55..0.7))?;
     let groups = Groups::of(links, &sights, &patches, &stage.part(0.7..0.85))?;
     let choice = stage.part(0.85..0.9);
     let (mut signs, looks) = match options.orient {
         Orient::Outward => (Signs::outward(groups, &choice)?, None),
-        _ => Signs::consistent(groups, &grid, &patches, &sights, &choice)?,
+        _ => Signs::consistent(groups, grid, &patches, &sights, &choice)?,
     };
-    let mut decisions = decide(&grid, &patches, &sights, &mut signs)?;
+    let mut decisions = decide(grid, &patches, &sights, &mut signs)?;
     if options.orient == Orient::Consistent {
         let facing = stage.part(0.9..0.95);
-        facing::turn_to_what_looks(&grid, &patches, &sights, looks, &mut signs, &mut decisions, &facing)?;
+        facing::turn_to_what_looks(grid, &patches, &sights, looks, &mut signs, &mut decisions, &facing)?;
     }
     let components = Components::of(&decisions)?;
-    let of_point = turn(&grid, &patches, &members, &signs, normals, options.components, &stage.part(0.95..1.0))?;
+    let of_point = turn(grid, &patches, &members, &signs, normals, options.components, &stage.part(0.95..0.97))?;
+    if options.method == Method::Bilinear && options.cell == Cell::Auto {
+        means::average(points, &cubes, (&patches, &members), &signs, normals, &stage.part(0.97..1.0))?;
+    }
     Ok(Surfaces { components, of_point })
 }
 
