@@ -11,13 +11,12 @@ use super::signs::Signs;
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::lanes::transposed;
-use crate::lists::{grow, reserve};
+use crate::lists::grow;
 use crate::parallel::Scatter;
 use crate::points::Points;
 use crate::progress::Stage;
 use crate::surroundings::{Places, Surroundings};
 use glam::{Vec3, Vec4};
-use std::ops::Range;
 
 /// What errors call the memory of all this.
 const WHAT: &str = "the means of normals";
@@ -31,9 +30,6 @@ const LEAST_NOISE: f32 = 0.1;
 
 /// Patches that face apart by more than so much, by the cosine, are of different surfaces: elsewhere means change nothing.
 const APART: f32 = 0.5;
-
-/// Where lanes without a point are: beyond any reach.
-const NOWHERE: Vec3 = Vec3::splat(f32::MAX);
 
 /// Replaces the normals, which have their signs, of all points of patches next to which surfaces face apart, where there is
 /// noise; `noise` is that of the points, in edges of length `edge`. One pass over the patches; each point of such a one looks at
@@ -53,7 +49,8 @@ pub(super) fn average(
     let known: &[Vec3] = normals;
     let found = stage.part(0.0..0.9).collect(grid.blocks.len(), WHAT, &|block| {
         let mut surroundings = Surroundings::new();
-        let (mut near, mut torn, mut means) = (Near::new(), Vec::new(), Vec::new());
+        let (mut near, mut around) = (Near::new(), Vec::new());
+        let (mut torn, mut means) = (Vec::new(), Vec::new());
         let mut looked_at = None;
         for (brick, cube, bit) in grid.cubes_in(block) {
             if looked_at.replace(brick) != Some(brick) {
@@ -84,16 +81,16 @@ pub(super) fn average(
                 continue;
             }
             let reach = (f64::from((REACH * deviation).min(1.0)) * edge) as f32;
+            around.clear();
+            grow(&mut around, 27, WHAT)?;
             for place in set_bits(places).map(at) {
-                if !near.holds(place) {
-                    let others = members.of_cube(grid, surroundings.cube(place)).map(|(point, _)| point);
-                    near.add(place, others.map(|point| (points.positions[point], known[point])))?;
-                }
+                let others = members.of_cube(grid, surroundings.cube(place)).map(|(point, _)| point);
+                around.push(near.cube(place, others.map(|point| (points.positions[point], known[point])))?);
             }
             grow(&mut means, grid.points_of(cube).len(), WHAT)?;
             for (point, membership) in members.of_cube(grid, cube) {
                 if membership.patch().is_some_and(|(patch, _)| torn[patch]) {
-                    let mean = near.mean(set_bits(places).map(at), points.positions[point], reach);
+                    let mean = mean(&around, points.positions[point], reach);
                     means.push((point as u32, mean.try_normalize().unwrap_or(known[point])));
                 }
             }
@@ -110,70 +107,91 @@ pub(super) fn average(
     })
 }
 
-/// The points of cubes in and round a brick, with their normals, four at a time.
+/// What is known of the cubes in and round a brick.
 struct Near {
-    /// x, y and z of the positions, then of the normals.
-    rows: Vec<[Vec4; 6]>,
-    cubes: [Option<Cube>; Places::COUNT],
-}
-
-/// Where the points of a cube stand, and the box round them.
-#[derive(Clone)]
-struct Cube {
-    rows: Range<usize>,
-    low: Vec3,
-    high: Vec3,
+    cubes: Vec<Cube>,
+    /// For each place the number of its cube, if that was asked for.
+    numbers: [Option<usize>; Places::COUNT],
 }
 
 impl Near {
     fn new() -> Self {
-        Self { rows: Vec::new(), cubes: [const { None }; Places::COUNT] }
+        Self { cubes: Vec::new(), numbers: [None; Places::COUNT] }
     }
 
     fn clear(&mut self) {
-        self.rows.clear();
-        self.cubes.fill(None);
+        self.cubes.clear();
+        self.numbers.fill(None);
     }
 
-    fn holds(&self, place: usize) -> bool {
-        self.cubes[place].is_some()
-    }
-
-    /// Takes the points at a place, and their normals.
-    fn add(&mut self, place: usize, mut points: impl Iterator<Item = (Vec3, Vec3)>) -> Result<(), Error> {
-        let (start, mut low, mut high) = (self.rows.len(), Vec3::MAX, Vec3::MIN);
-        while let Some(first) = points.next() {
-            let mut four = [first, (NOWHERE, Vec3::ZERO), (NOWHERE, Vec3::ZERO), (NOWHERE, Vec3::ZERO)];
-            four[1..].iter_mut().zip(&mut points).for_each(|(to, point)| *to = point);
-            for (position, _) in four.iter().filter(|(position, _)| *position != NOWHERE) {
-                (low, high) = (low.min(*position), high.max(*position));
-            }
-            let [x, y, z, _] = transposed(four.map(|(position, _)| position.extend(0.0)));
-            let [along_x, along_y, along_z, _] = transposed(four.map(|(_, normal)| normal.extend(0.0)));
-            reserve(&mut self.rows, 1, WHAT)?;
-            self.rows.push([x, y, z, along_x, along_y, along_z]);
+    /// The cube at a place, which holds these points, with their normals.
+    fn cube(&mut self, place: usize, points: impl Iterator<Item = (Vec3, Vec3)> + Clone) -> Result<Cube, Error> {
+        if let Some(number) = self.numbers[place] {
+            return Ok(self.cubes[number]);
         }
-        self.cubes[place] = Some(Cube { rows: start..self.rows.len(), low, high });
-        Ok(())
+        grow(&mut self.cubes, 1, WHAT)?;
+        self.numbers[place] = Some(self.cubes.len());
+        let cube = Cube::of(points);
+        self.cubes.push(cube);
+        Ok(cube)
     }
+}
 
-    /// The sum of the normals within a distance of a position, of points in some places, the nearer the more.
-    fn mean(&self, places: impl Iterator<Item = usize>, position: Vec3, distance: f32) -> Vec3 {
-        let square = distance * distance;
-        let (scale, [x, y, z]) = (1.0 / square, position.to_array().map(Vec4::splat));
-        let mut sums = [Vec4::ZERO; 3];
-        for cube in places.filter_map(|place| self.cubes[place].as_ref()) {
-            if position.clamp(cube.low, cube.high).distance_squared(position) >= square {
-                continue;
-            }
-            for [other_x, other_y, other_z, along @ ..] in &self.rows[cube.rows.clone()] {
-                let (dx, dy, dz) = (*other_x - x, *other_y - y, *other_z - z);
-                let weights = (Vec4::ONE - scale * (dx * dx + dy * dy + dz * dz)).max(Vec4::ZERO);
-                for (sum, along) in sums.iter_mut().zip(along) {
-                    *sum += weights * *along;
-                }
+/// The points of a cube with their normals, those of one octant of the box round them together.
+#[derive(Clone, Copy)]
+struct Cube {
+    /// The middle of the box, and half of its sides.
+    middle: Vec4,
+    half: Vec4,
+    /// Of four octants each: x, y and z of the mean positions, then of the sums of the normals.
+    octants: [[Vec4; 6]; 2],
+}
+
+impl Cube {
+    fn of(points: impl Iterator<Item = (Vec3, Vec3)> + Clone) -> Self {
+        let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
+        for (position, _) in points.clone() {
+            (low, high) = (low.min(position), high.max(position));
+        }
+        let [middle, half] = [low + high, high - low].map(|sum| 0.5 * sum);
+        let mut sums = [(Vec3::ZERO, Vec3::ZERO, 0.0); 8];
+        for (position, normal) in points {
+            let (place, along, count) = &mut sums[position.cmpge(middle).bitmask() as usize];
+            *place += position - middle;
+            *along += normal;
+            *count += 1.0;
+        }
+        let octants = [0, 4].map(|first| {
+            let four: [_; 4] = std::array::from_fn(|i| sums[first + i]);
+            // Where there is none, beyond any reach.
+            let mean = |place: Vec3, count: f32| if count > 0.0 { middle + place / count } else { Vec3::MAX };
+            let [x, y, z, _] = transposed(four.map(|(place, _, count)| mean(place, count).extend(0.0)));
+            let [along_x, along_y, along_z, _] = transposed(four.map(|(_, along, _)| along.extend(0.0)));
+            [x, y, z, along_x, along_y, along_z]
+        });
+        Self { middle: middle.extend(0.0), half: half.extend(0.0), octants }
+    }
+}
+
+/// The sum of the normals within a distance of a position, the nearer the more.
+fn mean(cubes: &[Cube], position: Vec3, distance: f32) -> Vec3 {
+    // In WebAssembly maxima take several times as long.
+    let positive = |lanes: Vec4| Vec4::select(lanes.cmpgt(Vec4::ZERO), lanes, Vec4::ZERO);
+    let square = distance * distance;
+    let (scale, here) = (1.0 / square, position.extend(0.0));
+    let [x, y, z] = position.to_array().map(Vec4::splat);
+    let mut sums = [Vec4::ZERO; 3];
+    for Cube { middle, half, octants } in cubes {
+        if positive((here - *middle).abs() - *half).length_squared() >= square {
+            continue;
+        }
+        for [other_x, other_y, other_z, along @ ..] in octants {
+            let (dx, dy, dz) = (*other_x - x, *other_y - y, *other_z - z);
+            let weights = positive(Vec4::ONE - scale * (dx * dx + dy * dy + dz * dz));
+            for (sum, along) in sums.iter_mut().zip(along) {
+                *sum += weights * *along;
             }
         }
-        Vec3::from_array(sums.map(Vec4::element_sum))
     }
+    Vec3::from_array(sums.map(Vec4::element_sum))
 }

@@ -59,7 +59,7 @@ pub(super) struct Members {
 
 impl Members {
     /// The points of a cube.
-    pub fn of_cube(&self, grid: &Grid, cube: usize) -> impl Iterator<Item = (usize, Membership)> {
+    pub fn of_cube(&self, grid: &Grid, cube: usize) -> impl Iterator<Item = (usize, Membership)> + Clone {
         let range = grid.points_of(cube);
         let points = self.points[range.clone()].iter().map(|&point| point as usize);
         points.zip(self.of_point[range].iter().copied())
