@@ -705,6 +705,10 @@ fn in_noise_normals_are_means_where_surfaces_face_apart() {
         assert!(kept >= least_kept, "{name}: {kept} kept");
         let [before, after] = [&plain, &oriented].map(|e| root_mean_square(&angles(&e.normals, &cloud.normals)));
         assert!(after < 1.06 * before, "{name}: {after} degrees, {before} before");
+        for exponent in [-60, 60] {
+            let scaled: Vec<f32> = cloud.points.iter().map(|c| c * 2f32.powi(exponent)).collect();
+            assert!(orient(&scaled, Orient::Consistent).normals == oriented.normals, "{name}: 2^{exponent}");
+        }
     }
 }
 
@@ -721,25 +725,26 @@ fn clouds_without_a_surface_have_no_components() {
 fn it_can_be_stopped_anywhere() {
     use std::cell::Cell as Counter;
     use std::ops::ControlFlow;
-    // So noisy that the cubes are enlarged.
-    let cloud = terrain(60_000, 23).noisy(0.02, 8);
-    let points = Points::from_f32(&cloud.points).unwrap();
-    let options = Options { orient: Orient::Consistent, ..Options::default() };
-    let (calls, last) = (Counter::new(0), Counter::new(0.0));
-    let observer = |_: &'static str, fraction: f64| {
-        assert!(fraction >= last.get(), "{fraction} after {}", last.get());
-        last.set(fraction);
-        calls.set(calls.get() + 1);
-        ControlFlow::Continue(())
-    };
-    estimate(&points, &options, &Progress::new(&observer, &|| 0.0)).unwrap();
-    assert_eq!(last.get(), 1.0);
-    for stop in 0..calls.get() {
-        let heard = Counter::new(0);
-        let observer = |_: &'static str, _: f64| {
-            heard.set(heard.get() + 1);
-            if heard.get() > stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    // One so noisy that the cubes are enlarged.
+    for cloud in [terrain(20_000, 24), terrain(60_000, 23).noisy(0.02, 8)] {
+        let points = Points::from_f32(&cloud.points).unwrap();
+        let options = Options { orient: Orient::Consistent, ..Options::default() };
+        let (calls, last) = (Counter::new(0), Counter::new(0.0));
+        let observer = |_: &'static str, fraction: f64| {
+            assert!(fraction >= last.get(), "{fraction} after {}", last.get());
+            last.set(fraction);
+            calls.set(calls.get() + 1);
+            ControlFlow::Continue(())
         };
-        assert_eq!(estimate(&points, &options, &Progress::new(&observer, &|| 0.0)), Err(Error::Cancelled));
+        estimate(&points, &options, &Progress::new(&observer, &|| 0.0)).unwrap();
+        assert_eq!(last.get(), 1.0);
+        for stop in 0..calls.get() {
+            let heard = Counter::new(0);
+            let observer = |_: &'static str, _: f64| {
+                heard.set(heard.get() + 1);
+                if heard.get() > stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            };
+            assert_eq!(estimate(&points, &options, &Progress::new(&observer, &|| 0.0)), Err(Error::Cancelled));
+        }
     }
 }

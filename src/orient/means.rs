@@ -51,47 +51,43 @@ pub(super) fn average(
         let mut surroundings = Surroundings::new();
         let (mut near, mut around) = (Near::new(), Vec::new());
         let (mut torn, mut means) = (Vec::new(), Vec::new());
-        let mut looked_at = None;
+        let (mut looked_at, mut corner, per_edge) = (None, Vec3::ZERO, (1.0 / edge) as f32);
         for (brick, cube, bit) in grid.cubes_in(block) {
             if looked_at.replace(brick) != Some(brick) {
                 surroundings.look(grid, brick);
                 near.clear();
+                // Near enough that differences are exact, and in edges squares are numbers, whatever the unit.
+                corner = members.of_cube(grid, cube).next().map_or(Vec3::ZERO, |(point, _)| points.positions[point]);
             }
-            let (own, places) = (patches.of_cube(cube), surroundings.occupied.near(bit));
-            let at = |place: u32| Places::of_near(bit, place);
+            let position = |point: usize| per_edge * (points.positions[point] - corner);
+            let (own, near_bits) = (patches.of_cube(cube), surroundings.occupied.near(bit));
+            let places = || set_bits(near_bits).map(|near| Places::of_near(bit, near));
+            let others = || places().flat_map(|place| patches.of_cube(surroundings.cube(place)));
             // For each patch, whether others face apart from it.
             torn.clear();
             grow(&mut torn, own.len(), WHAT)?;
-            torn.extend(own.map(|patch| {
-                let is_apart = |other: usize| facing(patch).dot(facing(other)) < APART;
-                set_bits(places).any(|place| patches.of_cube(surroundings.cube(at(place))).any(is_apart))
-            }));
+            torn.extend(own.map(|patch| others().any(|other| facing(patch).dot(facing(other)) < APART)));
             if !torn.contains(&true) {
                 continue;
             }
             // A clean edge stays sharp, whatever noise there is elsewhere.
-            let (mut squares, mut count) = (0.0, 0);
-            for patch in set_bits(places).flat_map(|place| patches.of_cube(surroundings.cube(at(place)))) {
-                let Patch { points, .. } = patches.all[patch];
-                squares += points as f32 * patches.all[patch].variance(*noise);
-                count += points;
-            }
-            let deviation = (squares / count as f32).sqrt();
+            let deviation = deviation(others().map(|other| &patches.all[other]), *noise);
             if deviation <= LEAST_NOISE {
                 continue;
             }
-            let reach = (f64::from((REACH * deviation).min(1.0)) * edge) as f32;
+            let reach = (REACH * deviation).min(1.0);
             around.clear();
             grow(&mut around, 27, WHAT)?;
-            for place in set_bits(places).map(at) {
-                let others = members.of_cube(grid, surroundings.cube(place)).map(|(point, _)| point);
-                around.push(near.cube(place, others.map(|point| (points.positions[point], known[point])))?);
+            for place in places() {
+                let others = members.of_cube(grid, surroundings.cube(place));
+                around.push(near.cube(place, others.map(|(point, _)| (position(point), known[point])))?);
             }
             grow(&mut means, grid.points_of(cube).len(), WHAT)?;
             for (point, membership) in members.of_cube(grid, cube) {
                 if membership.patch().is_some_and(|(patch, _)| torn[patch]) {
-                    let mean = mean(&around, points.positions[point], reach);
-                    means.push((point as u32, mean.try_normalize().unwrap_or(known[point])));
+                    // No negative zeros.
+                    let mean = Vec3::ZERO + mean(&around, position(point), reach).normalize_or(known[point]);
+                    means.push((point as u32, mean));
                 }
             }
         }
@@ -105,6 +101,16 @@ pub(super) fn average(
             normal[0] = mean;
         }
     })
+}
+
+/// How far the points of some patches lie off these, in edges: the root mean square.
+fn deviation<'a>(patches: impl Iterator<Item = &'a Patch>, noise: f32) -> f32 {
+    let (mut squares, mut count) = (0.0, 0);
+    for patch in patches {
+        squares += patch.points as f32 * patch.variance(noise);
+        count += patch.points;
+    }
+    (squares / count as f32).sqrt()
 }
 
 /// What is known of the cubes in and round a brick.
@@ -124,7 +130,7 @@ impl Near {
         self.numbers.fill(None);
     }
 
-    /// The cube at a place, which holds these points, with their normals.
+    /// The cube at a place, which holds these points: where they are, in edges, and their normals.
     fn cube(&mut self, place: usize, points: impl Iterator<Item = (Vec3, Vec3)> + Clone) -> Result<Cube, Error> {
         if let Some(number) = self.numbers[place] {
             return Ok(self.cubes[number]);

@@ -124,10 +124,12 @@ fn surfaces(
         facing::turn_to_what_looks(grid, &patches, &sights, looks, &mut signs, &mut decisions, &facing)?;
     }
     let components = Components::of(&decisions)?;
-    let of_point = turn(grid, &patches, &members, &signs, normals, options.components, &stage.part(0.95..0.97))?;
+    let last = stage.part(0.95..1.0);
+    let of_point = turn(grid, &patches, &members, &signs, normals, options.components, &last.part(0.0..0.4))?;
     if options.method == Method::Bilinear && options.cell == Cell::Auto {
-        means::average(points, &cubes, (&patches, &members), &signs, normals, &stage.part(0.97..1.0))?;
+        means::average(points, &cubes, (&patches, &members), &signs, normals, &last.part(0.4..1.0))?;
     }
+    last.tell(1.0)?;
     Ok(Surfaces { components, of_point })
 }
 
