@@ -1,6 +1,7 @@
 // The measurements: rows of clouds with known signs, as plain numbers.
 
 import { VARIANTS, cloudOf, diagonal } from '../accuracy/clouds.mjs';
+import { angles, summary } from '../accuracy/judge.mjs';
 import { rightSigns } from './judge.mjs';
 import { SHAPES, turned } from './shapes.mjs';
 import { cornersOf, hidden, signedVolume, thickness } from './solid.mjs';
@@ -118,6 +119,8 @@ export async function measureAll(estimator, rows, { tell, peers }) {
     tell(`${row.name}, ${row.variant}`);
     const { positions, normals: truth } = cloud();
     const thick = walls?.().map((wall) => wall > THICK);
+    const off = (normals) => summary(angles(normals, truth)).rms;
+    const lines = { none: off((await estimator.estimateNormals(positions)).normals) };
     const modes = {};
     for (const mode of MODES) {
       const { normals, report, seconds } = await timed(estimator, positions, { orient: mode });
@@ -126,11 +129,12 @@ export async function measureAll(estimator, rows, { tell, peers }) {
         signs.thick = rightSigns(normals, truth, (i) => thick[i] === 1);
         signs.thin = rightSigns(normals, truth, (i) => thick[i] === 0);
       }
+      lines[mode] = off(normals);
       const { components } = report;
       modes[mode] = { signs, components: components.count, largest: components.largest[0], seconds };
     }
     const others = row.sides && (await peers?.(row, { positions, normals: truth }));
-    results.push({ ...row, points: positions.length / 3, modes, ...(others && { peers: others }) });
+    results.push({ ...row, points: positions.length / 3, lines, modes, ...(others && { peers: others }) });
   }
   return results;
 }

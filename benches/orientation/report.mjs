@@ -9,6 +9,7 @@ import { ENOUGH, MODES, RUNS, THICK } from './measure.mjs';
 const share = (value) => `${value === 1 ? '100' : (Math.floor(1e5 * value + 1e-6) / 1e3).toFixed(3)} %`;
 const asPercent = (value) => `${Number((100 * value).toFixed(1))} %`;
 const seconds = (value) => value.toFixed(3);
+const degrees = (value) => value.toFixed(2);
 const least = (rows, value) => rows.reduce((a, b) => (value(b) < value(a) ? b : a));
 const fullName = ({ name, variant }) => `${name}, ${variant}`;
 const side = ({ side, confidence }) => `${side} ${confidence.toFixed(2)}`;
@@ -19,7 +20,7 @@ export function report(rows, { machine, minutes, hasFolder, skipped, notes }) {
   return `${paragraphs(
     '# Orientation, measured',
     "Signs by `orient: 'consistent'` and `'outward'` against true ones, on generated shapes, on points sampled on meshes, and on range scans. Written by `npm run orientation`, text and all; not to be edited.",
-    `${model}, ${cores} cores, Node ${node}, ${date}; took ${minutes.toFixed(1)} minutes. Shares are of the points with a true normal, and never rounded up; a point without a normal is not right. Normals must point outwards; those of an open surface, marked ○, either all to one side or all to the other. Scenes (scene, view) are what scanners see of a corner of a room with furniture in it (benches/orientation/scene.mjs): normals must face them. Clear: without the points whose normal is more than 60 degrees off the true one, either way; at sharp edges and in noise these have the normal of another face, and their sign says little. What is asked counts all points. Times are of WebAssembly in Node with one thread, in seconds for a million points, the fastest of ${RUNS} runs, or of fewer where these take more than ${ENOUGH / 1_000} seconds.`,
+    `${model}, ${cores} cores, Node ${node}, ${date}; took ${minutes.toFixed(1)} minutes. Shares are of the points with a true normal, and never rounded up; a point without a normal is not right. Normals must point outwards; those of an open surface, marked ○, either all to one side or all to the other. Scenes (scene, view) are what scanners see of a corner of a room with furniture in it (benches/orientation/scene.mjs): normals must face them. Clear: without the points whose normal is more than 60 degrees off the true one, either way; at sharp edges and in noise these have the normal of another face, and their sign says little. What is asked counts all points. Off: how far the lines of the normals are off the true ones, whatever their signs, in degrees, root mean square, without orientation and with it, which averages normals in noise. Times are of WebAssembly in Node with one thread, in seconds for a million points, the fastest of ${RUNS} runs, or of fewer where these take more than ${ENOUGH / 1_000} seconds.`,
     `Noise is normally distributed, its standard deviation a share of the diagonal of the box; stripes and gradient are patterns of density (benches/accuracy/clouds.mjs). A wall is thick that is more than ${THICK} times the deviation of the noise, along the inward normal, or that has no other side.`,
     '## In short',
     overview(rows),
@@ -96,6 +97,8 @@ export function details(rows) {
       ...MODES.map((mode) => `largest: ${mode}`),
       ...MODES.map((mode) => `s: ${mode}`),
       's: all',
+      'off: none',
+      'off: consistent',
     ],
     known.map((row) => [
       `${fullName(row)}${row.open ? ' ○' : ''}`,
@@ -104,6 +107,8 @@ export function details(rows) {
       judged(row),
       ...(hasWalls ? thick(row) : []),
       ...facts(row),
+      degrees(row.lines.none),
+      degrees(row.lines.consistent),
     ]),
   );
 }

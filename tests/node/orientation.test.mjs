@@ -90,6 +90,15 @@ describe('the small run', () => {
     assert.equal(find('box', 'clean').modes.outward.signs.thick, undefined);
   });
 
+  test('tells how far lines are off, and that only noise lets signs change them', () => {
+    for (const { variant, lines } of rows) {
+      assert.deepEqual(Object.keys(lines), ['none', ...MODES]);
+      if (variant === 'clean') assert.equal(lines.consistent, lines.none);
+    }
+    const { none, consistent } = find('box', 'noise0.6').lines;
+    assert.ok(consistent !== none && Math.abs(consistent - none) < 0.1 * none, `${consistent} degrees for ${none}`);
+  });
+
   test('tells times, and the surfaces', () => {
     for (const { modes } of rows) {
       assert.deepEqual(Object.keys(modes), MODES);
