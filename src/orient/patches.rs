@@ -31,14 +31,14 @@ impl Patch {
         self.normal.dot(other.normal).powi(16)
     }
 
-    /// That of its points about its plane; `noise` is theirs, in edges.
-    pub fn variance(&self, noise: f32) -> f32 {
-        Limits::of(noise).uneven * (1.0 / self.flatness - 1.0)
-    }
-
     /// How much there is of it, up to 1: few points may be anything.
     pub fn certainty(&self) -> f32 {
         (self.points as f32 / CERTAIN).min(1.0)
+    }
+
+    /// The variance of its points about its plane; `noise` is theirs, in edges.
+    pub fn variance(&self, noise: f32) -> f32 {
+        Limits::of(noise).uneven * (1.0 / self.flatness - 1.0)
     }
 }
 
