@@ -1,12 +1,19 @@
 //! Four numbers at once, where glam 0.34 takes them one by one, and the transposed of four times four.
 
 use glam::{Mat4, Vec4};
-use std::simd::{StdFloat, f32x4};
+use std::simd::{StdFloat, f32x4, simd_swizzle};
 
 /// The first four of some numbers.
 #[inline(always)]
 pub(crate) fn load(numbers: &[f32]) -> Vec4 {
     bytemuck::cast::<[f32; 4], _>(numbers[..4].try_into().unwrap())
+}
+
+/// The lanes that stand before those of `four`, where `before` are the four before them.
+#[inline(always)]
+pub(crate) fn after(before: Vec4, four: Vec4) -> Vec4 {
+    let [before, four] = [before, four].map(|lanes| f32x4::from_array(lanes.to_array()));
+    Vec4::from_array(simd_swizzle!(before, four, [3, 4, 5, 6]).to_array())
 }
 
 /// Rows for columns.

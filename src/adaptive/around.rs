@@ -3,7 +3,8 @@
 use crate::bricks::set_bits;
 use crate::grid::Grid;
 use crate::surroundings::{Side, sides};
-use glam::{UVec3, Vec3};
+use bytemuck::{Pod, Zeroable};
+use glam::{UVec3, Vec3, Vec4};
 
 const SIDES: [Side; 27] = sides(2);
 
@@ -16,8 +17,9 @@ pub(super) struct Around {
     list: [Near; 125],
 }
 
-/// A cube near another one.
-#[derive(Clone, Copy)]
+/// A cube near another one. Put together as four lanes of floats, which are stored as one.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(16))]
 pub(super) struct Near {
     /// What lies between the two, in edges.
     pub step: Vec3,
@@ -25,12 +27,12 @@ pub(super) struct Near {
     pub cube: u32,
 }
 
-/// What lies between the first of 8x8 places and each of them.
-const STEPS: [Vec3; 64] = {
-    let mut steps = [Vec3::ZERO; 64];
+/// What lies between the first of 8x8 places and each of them, in three of four lanes.
+const STEPS: [Vec4; 64] = {
+    let mut steps = [Vec4::ZERO; 64];
     let mut i = 0;
     while i < 64 {
-        steps[i] = Vec3::new((i % 8) as f32, (i / 8) as f32, 0.0);
+        steps[i] = Vec4::new((i % 8) as f32, (i / 8) as f32, 0.0, 0.0);
         i += 1;
     }
     steps
@@ -44,11 +46,15 @@ impl Around {
 
     /// Looks up the 27 bricks around and in place of brick `brick`.
     #[inline(never)]
-    #[optimize(size)]
     fn look(&mut self, grid: &Grid, brick: usize) {
         self.brick = brick;
         self.occupied = [0; 8];
-        for Side { step, facing, shift } in &SIDES {
+        let own = grid.masks[brick];
+        for (Side { step, facing, shift }, opposite) in SIDES.iter().zip(SIDES.iter().rev()) {
+            // Only what lies near cubes of the brick is asked for. The last steps are the opposites of the first.
+            if own & opposite.facing == 0 {
+                continue;
+            }
             let Some(number) = grid.bricks.number(grid.bricks.places[brick] + step) else { continue };
             for bit in set_bits(grid.masks[number as usize] & facing) {
                 let place = Self::place(bit).wrapping_add_signed(*shift);
@@ -70,11 +76,11 @@ impl Around {
         let mut count = 0;
         for z in 0..=2 * reach {
             let first = 64 * (corner.z + z);
-            let row = Vec3::new(0.0, 0.0, z as f32) - reach as f32;
+            let row = Vec4::new(0.0, 0.0, z as f32, 0.0) - reach as f32;
             for near in set_bits(self.occupied[first as usize / 64] >> shift & rows) {
                 // It never is more, but so the compiler knows.
                 let cube = self.cubes[(first + shift + near) as usize % 512];
-                self.list[count] = Near { step: STEPS[near as usize] + row, cube };
+                self.list[count] = bytemuck::cast((STEPS[near as usize] + row).with_w(f32::from_bits(cube)));
                 count += 1;
             }
         }

@@ -9,7 +9,7 @@ use super::tally::Tally;
 use super::{DIVISIONS, WHAT};
 use crate::error::Error;
 use crate::grid::located;
-use crate::lanes::{inverse_root, load, power, root, transposed};
+use crate::lanes::{after, inverse_root, power, root, transposed};
 use crate::lattice::cube_centre;
 use crate::normals::{Normals, SHORT, Writer};
 use crate::parallel::Filling;
@@ -142,8 +142,8 @@ impl<'a> Task<'a> {
             is_edge = has_many && self.faces.find(level, bit, near, chosen);
             if !is_edge {
                 // Else noise hides what the parts could tell, also of an edge in this very cube.
-                let in_noise = near.iter().filter(|near| level.surfaces[near.cube as usize].is_plane_in_noise).count();
-                if can_divide && IN_NOISE * in_noise < near.len() {
+                let in_noise = |near: &&Near| level.surfaces[near.cube as usize].is_plane_in_noise;
+                if can_divide && IN_NOISE * near.iter().filter(in_noise).count() < near.len() {
                     return Role::Wanted;
                 }
                 let noises = near.iter().map(|near| chosen[near.cube as usize].flat_noise);
@@ -192,18 +192,18 @@ fn quartile(values: impl Iterator<Item = f32> + Clone) -> f32 {
     if rank == 0 {
         return f32::INFINITY;
     }
-    // The least so far, in their order, after one that is less than all.
-    let mut least = [f32::INFINITY; 4 + 32];
-    least[3] = f32::NEG_INFINITY;
+    // The least so far, in their order.
+    let mut least = [Vec4::INFINITY; 8];
     for value in values.filter(|value| *value < f32::INFINITY) {
         // Each gives way to the one before it, if that is more than the value, or else to the value. Four at once, because
         // nothing foretells how far a value goes.
-        for i in (1..=1 + rank / 4).rev().map(|four| 4 * four) {
-            let (here, before) = (load(&least[i..]), load(&least[i - 1..]));
-            here.min(Vec4::splat(value)).max(before).write_to_slice(&mut least[i..]);
+        let mut before = Vec4::NEG_INFINITY;
+        for four in &mut least[..=rank / 4] {
+            let here = std::mem::replace(four, four.min(Vec4::splat(value)).max(after(before, *four)));
+            before = here;
         }
     }
-    least[4 + rank]
+    least[rank / 4][rank % 4]
 }
 
 /// `exp(-x)`, nearly, and below zero more than that: the same bits everywhere. Zero from some 10,000; not for -16 and less.
@@ -292,6 +292,7 @@ impl Voters {
 }
 
 /// Four votes on the normal at a point, lane by lane.
+#[derive(Clone)]
 struct Votes {
     weight: Vec4,
     normal: [Vec4; 3],
@@ -299,6 +300,11 @@ struct Votes {
     height: Vec4,
     /// What makes a unit vector of the gradient.
     scale: Vec4,
+}
+
+impl Votes {
+    /// Before anybody was asked.
+    const NONE: Self = Self { weight: Vec4::ZERO, normal: [Vec4::ZERO; 3], height: Vec4::ZERO, scale: Vec4::ZERO };
 }
 
 /// The vote that counts most.
@@ -323,7 +329,7 @@ impl Best {
 #[derive(Default)]
 struct Ballot {
     voters: Vec<Voters>,
-    /// What they say about the point that was asked about last.
+    /// What each of them says about the point that was asked about last.
     votes: Vec<Votes>,
 }
 
@@ -338,20 +344,20 @@ impl Ballot {
             let mut next = || all.next().unwrap_or((Vec3::ZERO, &Chosen::NONE));
             self.voters.push(Voters::of([first, next(), next(), next()], reference));
         }
+        // Here, and not while they speak: what may have to grow keeps nothing in registers.
+        self.votes.resize(self.voters.len(), Votes::NONE);
     }
 
     /// Asks about a point. The vote that counts most, if there are any.
     #[inline(never)]
     fn ask(&mut self, point: Vec3) -> Best {
-        self.votes.clear();
         // Lane by lane: the weight, and the number of the four.
         let (mut most, mut place) = (Vec4::NEG_ONE, Vec4::ZERO);
-        for (i, voters) in self.voters.iter().enumerate() {
-            let votes = voters.speak(point);
+        for (i, (voters, votes)) in self.voters.iter().zip(&mut self.votes).enumerate() {
+            *votes = voters.speak(point);
             let is_more = votes.weight.cmpgt(most);
             most = Vec4::select(is_more, votes.weight, most);
             place = Vec4::select(is_more, Vec4::splat(i as f32), place);
-            self.votes.push(votes);
         }
         let lane = most.max_position();
         let (Some(votes), Some(voters)) = (self.votes.get(place[lane] as usize), self.voters.get(place[lane] as usize))
