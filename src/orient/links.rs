@@ -1,14 +1,16 @@
 //! What neighbouring patches say about each other's sign.
 
-use super::patches::{Patch, Patches};
+use super::patches::{MOST, Patch, Patches};
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
+use crate::lanes::{power, root, transposed};
 use crate::lists::{filled, fitted, grow, reserve, starts};
 use crate::parallel::Filling;
 use crate::progress::Stage;
-use crate::surroundings::{NEAR, Places, Surroundings};
-use glam::{Vec3, Vec4Swizzles};
+use crate::surroundings::{NEAR, Places, STEPS, Surroundings};
+use glam::{Vec3, Vec4, Vec4Swizzles};
+use std::ops::Range;
 
 /// What errors call the memory of the links.
 pub(super) const GRAPH: &str = "the graph of patches";
@@ -42,8 +44,8 @@ struct Run {
 const SHARPNESS: f32 = 0.2;
 
 /// How often it is squared at least and at most: noise is not all that makes patches of one surface unlike.
-const LEAST_SQUARINGS: u32 = 2;
-const MOST_SQUARINGS: u32 = 5;
+const LEAST_SQUARINGS: usize = 2;
+const MOST_SQUARINGS: usize = 5;
 
 /// How much the least of these powers counts beside the one that noise allows: across some edges there is nothing more.
 const BLUNT: f32 = 0.2;
@@ -68,34 +70,41 @@ impl Links {
         let runs = Filling::new(patches.all.len(), GRAPH)?;
         let lists = stage.collect(grid.blocks.len(), GRAPH, &|block| {
             let mut surroundings = Surroundings::new();
-            let (mut near, mut links) = (Vec::new(), Vec::new());
+            let (mut near, mut fours, mut links) = (Vec::new(), Vec::new(), Vec::new());
+            grow(&mut near, STEPS.len() * MOST, GRAPH)?;
+            grow(&mut fours, STEPS.len() * MOST / 4, GRAPH)?;
             let mut looked_at = None;
             for (brick, cube, bit) in grid.cubes_in(block) {
                 if looked_at.replace(brick) != Some(brick) {
                     surroundings.look(grid, brick);
                 }
+                let of_place = |place: u32| patches.of_cube(surroundings.cube(Places::of_near(bit, place)));
                 near.clear();
-                let mut most = 0;
                 for place in set_bits(surroundings.occupied.near(bit)) {
-                    let others = patches.of_cube(surroundings.cube(Places::of_near(bit, place)));
-                    most += others.len();
-                    near.push((others, NEAR[place as usize % 64].xyz()));
+                    near.extend(of_place(place).map(|patch| (patch, place)));
                 }
+                fours.clear();
+                fours.extend(near.chunks(4).map(|near| Four::of(patches, near)));
                 let all = patches.of_cube(cube);
+                grow(&mut links, all.len() * near.len(), GRAPH)?;
                 for own in all.clone() {
-                    grow(&mut links, most, GRAPH)?;
                     let (start, patch) = (links.len(), &patches.all[own]);
-                    for (others, step) in &near {
-                        for to in others.clone() {
-                            let other = &patches.all[to];
-                            let mut evidence = evidence(patch, other, *step, squarings);
-                            if to == own || evidence.abs() <= LEAST {
+                    for (near, four) in near.chunks(4).zip(&fours) {
+                        let evidence_of = four.evidence(patch, squarings);
+                        let says = evidence_of.abs().cmpgt(Vec4::splat(LEAST)).bitmask();
+                        for ((lane, mut evidence), &(to, place)) in (0..).zip(evidence_of.to_array()).zip(near) {
+                            if says >> lane & 1 == 0 || to == own {
                                 continue;
                             }
-                            if is_clean && (patch.has_rival || other.has_rival) && *step != Vec3::ZERO {
+                            let other = &patches.all[to];
+                            if is_clean && (patch.has_rival || other.has_rival) && place != Places::NEAR_CENTRE {
+                                let step = NEAR[place as usize % 64].xyz();
+                                let share = |a: &Patch, b: &Patch, of_cube: Range<usize>, step: Vec3| {
+                                    if b.has_rival { share(a, b, &patches.all[of_cube], step) } else { 1.0 }
+                                };
                                 // One product, so that it is the same to the bit from both ends.
-                                evidence *= share(patch, other, &patches.all[others.clone()], *step)
-                                    * share(other, patch, &patches.all[all.clone()], -*step);
+                                evidence *= share(patch, other, of_place(place), step)
+                                    * share(other, patch, all.clone(), -step);
                             }
                             links.push(Link { to: to as u32, evidence });
                         }
@@ -180,40 +189,73 @@ impl Links {
 }
 
 /// How often the likeness of patches is squared; `noise` is that of the points, in edges.
-fn squarings(noise: f32) -> u32 {
+fn squarings(noise: f32) -> usize {
     let root_2 = std::f32::consts::SQRT_2;
     (LEAST_SQUARINGS..MOST_SQUARINGS)
         .find(|&squarings| noise * noise * root_2 * (1u32 << squarings) as f32 > SHARPNESS)
         .unwrap_or(MOST_SQUARINGS)
 }
 
-/// Whether two patches agree: the second one's cube lies `step` cubes from the first one's.
-///
-/// The first normal is reflected at the plane across the line between their centres: so the normals at both ends of an arc
-/// of a circle are each other's picture, also at a right-angled crease and on the two sides of a thin plate, where the
-/// normals alone say nothing, or the opposite (after Xie, McDonnell and Qin, "Surface reconstruction of noisy and defective
-/// data sets", 2004). The less alike the picture, the more likely these are two sheets: hence the power. A line along the
-/// normals is no evidence, as noise of one surface and both sides of a wall look the same.
-#[inline(always)]
-fn evidence(a: &Patch, b: &Patch, step: Vec3, squarings: u32) -> f32 {
-    // So that the other way round it is the opposite to the bit.
-    let line = step + (b.centre - a.centre);
-    let square = line.length_squared();
-    let dot = a.normal.dot(b.normal);
-    // In one place: between centres less than a fiftieth of an edge apart there is no line, only two normals that cross.
-    if square < 4e-4 {
-        return dot * dot * dot;
+/// Four patches near one, number for number in lanes.
+struct Four {
+    /// From the cube of that one to theirs, in edges.
+    step: [Vec4; 3],
+    centre: [Vec4; 3],
+    normal: [Vec4; 3],
+    flatness: Vec4,
+    certainty: Vec4,
+}
+
+impl Four {
+    /// At most four, by number and by bit of [`Places::near`]; then the last of them once more.
+    #[inline(always)]
+    fn of(patches: &Patches, near: &[(usize, u32)]) -> Self {
+        let near: [(usize, u32); 4] = std::array::from_fn(|lane| near[lane.min(near.len() - 1)]);
+        let patch = |lane: usize| &patches.all[near[lane].0];
+        let rows = |row: &dyn Fn(usize) -> Vec4| transposed([row(0), row(1), row(2), row(3)]);
+        let [x, y, z, flatness] = rows(&|lane| patch(lane).centre.extend(patch(lane).flatness));
+        let [along_x, along_y, along_z, certainty] = rows(&|lane| patch(lane).normal.extend(patch(lane).certainty()));
+        let [step_x, step_y, step_z, _] = rows(&|lane| NEAR[near[lane].1 as usize % 64]);
+        Self {
+            step: [step_x, step_y, step_z],
+            centre: [x, y, z],
+            normal: [along_x, along_y, along_z],
+            flatness,
+            certainty,
+        }
     }
-    let across = line.dot(a.normal) * line.dot(b.normal) / square;
-    let reflected = dot - 2.0 * across;
-    let fourth = (reflected * reflected) * (reflected * reflected);
-    let sharp = (LEAST_SQUARINGS..squarings).fold(fourth, |power, _| power * power);
-    let trust = a.flatness * b.flatness * a.certainty().min(b.certainty()).sqrt();
-    reflected * ((sharp + BLUNT * fourth) / (1.0 + BLUNT)) * (1.0 - across.abs()) * trust
+
+    /// Whether each agrees with a patch of that cube.
+    ///
+    /// The first normal is reflected at the plane across the line between their centres: so the normals at both ends of an arc
+    /// of a circle are each other's picture, also at a right-angled crease and on the two sides of a thin plate, where the
+    /// normals alone say nothing, or the opposite (after Xie, McDonnell and Qin, "Surface reconstruction of noisy and defective
+    /// data sets", 2004). The less alike the picture, the more likely these are two sheets: hence the power. A line along the
+    /// normals is no evidence, as noise of one surface and both sides of a wall look the same.
+    #[inline(always)]
+    fn evidence(&self, patch: &Patch, squarings: usize) -> Vec4 {
+        let dot =
+            |[x, y, z]: [Vec4; 3], [other_x, other_y, other_z]: [Vec4; 3]| x * other_x + y * other_y + z * other_z;
+        let splat = |vector: Vec3| vector.to_array().map(Vec4::splat);
+        let (centre, normal) = (splat(patch.centre), splat(patch.normal));
+        // So that the other way round it is the opposite to the bit.
+        let line = [0, 1, 2].map(|axis| self.step[axis] + (self.centre[axis] - centre[axis]));
+        let (square, alike) = (dot(line, line), dot(normal, self.normal));
+        let across = dot(line, normal) * dot(line, self.normal) / square;
+        let reflected = alike - 2.0 * across;
+        let fourth = power(reflected, LEAST_SQUARINGS);
+        let sharp = power(fourth, squarings - LEAST_SQUARINGS);
+        let certainty = Vec4::splat(patch.certainty());
+        let certainty = Vec4::select(certainty.cmplt(self.certainty), certainty, self.certainty);
+        let trust = patch.flatness * self.flatness * root(certainty);
+        let evidence = reflected * ((sharp + BLUNT * fourth) / (1.0 + BLUNT)) * (1.0 - across.abs()) * trust;
+        // In one place: between centres less than a fiftieth of an edge apart there is no line, only two normals that cross.
+        Vec4::select(square.cmplt(Vec4::splat(4e-4)), alike * alike * alike, evidence)
+    }
 }
 
 /// A sheet goes on in one sheet: what is left of the evidence between two patches, from 1 down to 0, where a rival of the
-/// second one, of `all` in its cube, lies better in line with the first.
+/// second one, which has some, of `all` in its cube, lies better in line with the first.
 #[inline(never)]
 fn share(a: &Patch, b: &Patch, all: &[Patch], step: Vec3) -> f32 {
     // How far the two lie off each other's planes.
@@ -223,7 +265,7 @@ fn share(a: &Patch, b: &Patch, all: &[Patch], step: Vec3) -> f32 {
         x * x + y * y + EVEN
     };
     let mut share: f32 = 1.0;
-    let own = if b.has_rival { off(b) } else { EVEN };
+    let own = off(b);
     if own > 2.0 * EVEN {
         for rival in all.iter().filter(|rival| !std::ptr::eq(*rival, b)) {
             share = share.min(off(rival) / (own * b.likeness(rival) * rival.certainty()));
@@ -240,6 +282,11 @@ mod tests {
         Patch { centre, normal, points: 16, flatness: 1.0, has_rival: false }
     }
 
+    fn evidence(a: &Patch, b: &Patch, step: u32, squarings: usize) -> f32 {
+        let patches = Patches { all: vec![*b], first: vec![0, 1] };
+        Four::of(&patches, &[(0, step)]).evidence(a, squarings).x
+    }
+
     #[test]
     fn patches_on_an_arc_agree_whatever_the_noise() {
         let on_arc = |angle: f32| {
@@ -248,7 +295,7 @@ mod tests {
         };
         let (a, b) = (on_arc(0.2), on_arc(0.7));
         for noise in [0.0, 0.1, 0.3] {
-            let evidence = evidence(&a, &b, Vec3::ZERO, squarings(noise));
+            let evidence = evidence(&a, &b, Places::NEAR_CENTRE, squarings(noise));
             // Less what the line between them has of the normals.
             assert!((evidence - (1.0 - 0.25f32.sin().powi(2))).abs() < 1e-4, "{noise}: {evidence}");
         }
@@ -258,7 +305,7 @@ mod tests {
     #[test]
     fn where_there_is_no_noise_another_sheet_is_none_of_the_same_surface() {
         let (a, b) = (patch(Vec3::ZERO, Vec3::Z), patch(Vec3::new(0.0, 0.0, 0.4), Vec3::Z));
-        let at = |noise: f32| evidence(&a, &b, Vec3::X, squarings(noise));
+        let at = |noise: f32| evidence(&a, &b, Places::NEAR_CENTRE + 1, squarings(noise));
         assert!((0.0..0.1).contains(&at(0.0)), "{}", at(0.0));
         assert!(at(0.3) > 2.0 * at(0.0), "{}", at(0.3));
     }
@@ -278,14 +325,14 @@ mod tests {
     #[test]
     fn a_few_points_off_their_plane_say_little() {
         let (a, b) = (patch(Vec3::ZERO, Vec3::Z), patch(Vec3::X, Vec3::Z));
-        let say = |points, flatness| evidence(&a, &Patch { points, flatness, ..b }, Vec3::ZERO, 5);
+        let say = |points, flatness| evidence(&a, &Patch { points, flatness, ..b }, Places::NEAR_CENTRE, 5);
         assert_eq!(say(16, 1.0), 1.0);
         assert!(say(2, 1.0) <= 0.5 && say(16, 0.4) <= 0.4);
     }
 
     #[test]
     fn the_less_noise_the_sharper() {
-        let powers: Vec<u32> = [0.0, 0.08, 0.12, 0.16, 0.3].map(squarings).to_vec();
+        let powers: Vec<usize> = [0.0, 0.08, 0.12, 0.16, 0.3].map(squarings).to_vec();
         assert_eq!(powers, [5, 5, 4, 3, 2]);
     }
 }

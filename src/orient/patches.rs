@@ -33,7 +33,7 @@ impl Patch {
 
     /// How much there is of it, up to 1: few points may be anything.
     pub fn certainty(&self) -> f32 {
-        (self.points as f32 / CERTAIN).min(1.0)
+        if self.points < CERTAIN { self.points as f32 / CERTAIN as f32 } else { 1.0 }
     }
 
     /// The variance of its points about its plane; `noise` is theirs, in edges.
@@ -87,7 +87,7 @@ impl Membership {
 }
 
 /// Patches of a cube at the most: more are a tangle, and its points join whichever is nearest.
-const MOST: usize = 16;
+pub(super) const MOST: usize = 16;
 
 /// The normals of a patch lie within 32 degrees of their mean: its cosine, squared.
 const COSINE_SQUARED: f32 = 0.72;
@@ -106,7 +106,7 @@ const UNEVEN_DEVIATIONS: f32 = 4.0;
 const UNLIKE: f32 = 0.1;
 
 /// Patches of so many points are certain.
-const CERTAIN: f32 = 8.0;
+const CERTAIN: u32 = 8;
 
 /// How far the points of a patch may lie off its plane, in edges.
 #[derive(Clone, Copy)]
