@@ -62,7 +62,7 @@ function kindsOf({ kind, variant, sides }) {
 export const counted = ({ open }, { share, eitherWay }) => (open ? eitherWay : share);
 
 /**
- * A row against what is asked of it, `[{ kind, least, mode, share, met, clear }]`; `clear`: whether the points whose sign
+ * A row against what is asked of it, `[{ kind, part, least, mode, share, met, clear }]`; `clear`: whether the points whose sign
  * is clear meet it.
  */
 export function verdicts(row) {
@@ -72,7 +72,8 @@ export function verdicts(row) {
       const { signs } = row.modes[mode];
       if (!(signs[part].points > 0)) return [];
       const share = counted(row, signs[part]);
-      return [{ kind, least, mode, share, met: share >= least, clear: counted(row, signs[part].clear) >= least }];
+      const clear = counted(row, signs[part].clear) >= least;
+      return [{ kind, part, least, mode, share, met: share >= least, clear }];
     });
   });
 }

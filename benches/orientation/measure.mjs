@@ -2,7 +2,8 @@
 
 import { VARIANTS, cloudOf, diagonal } from '../accuracy/clouds.mjs';
 import { angles, summary } from '../accuracy/judge.mjs';
-import { rightSigns } from './judge.mjs';
+import { likeliest } from './attainable.mjs';
+import { rightSigns, verdicts } from './judge.mjs';
 import { SHAPES, turned } from './shapes.mjs';
 import { cornersOf, hidden, signedVolume, thickness } from './solid.mjs';
 
@@ -15,7 +16,14 @@ export const ENOUGH = 3_000;
 /** A wall is thick that is more than so many times the deviation of the noise. */
 export const THICK = 10;
 
+/** What is attainable is told with so much noise and more, by so many points of the surface, for so many of the cloud. */
+export const LEAST_NOISE = 0.006;
+const SURFACE = 300_000;
+export const TRIED = 5_000;
+
 const MESH_SEED = 101;
+/** For clouds of the same surface that are no part of the measured ones. */
+const OTHER_SEED = 777;
 /** Of a mesh's surface more may not lie inside of it: its signs would be a matter of opinion. */
 const MOST_HIDDEN = 0.02;
 
@@ -25,12 +33,14 @@ export const FULL = {
     ['clean', noise].map((variant) => ({ name, variant })),
   ),
   points: 100_000,
+  large: 1_000_000,
   meshVariants: Object.keys(VARIANTS),
 };
 /** For tests: seconds. */
 export const SMALL = {
   rows: ['sphere', 'terrain', 'moebius'].map((name) => ({ name, variant: 'clean' })),
   points: 15_000,
+  large: 30_000,
   meshVariants: ['clean', 'noise0.6'],
 };
 
@@ -60,16 +70,29 @@ export function withOutside(read) {
 }
 
 /**
- * The rows of a plan: each with a function `cloud` that answers `{ positions, normals }`, and for noisy meshes `walls`,
- * which answers how thick the wall behind each point is, in deviations of the noise. `scans`: `{ name, about, positions, normals }`.
+ * The rows of a plan: each with a function `cloud` that answers `{ positions, normals }`. Clean ones have `large`, which answers
+ * the positions of many more points, those with much noise `surface`, which answers `{ positions, normals, deviation }` of the
+ * surface and of its noise, and noisy meshes `walls`, which answers how thick the wall behind each point is, in deviations of the
+ * noise. `scans`: `{ name, about, positions, normals }`.
  */
-export function plannedRows({ rows, points, meshVariants }, meshes, scans = []) {
+export function plannedRows({ rows, points, large, meshVariants }, meshes, scans = []) {
   const shapes = Object.keys(SHAPES);
+  const clouds = (samplerFor, variant, seed) => {
+    const { noise = 0, keep } = VARIANTS[variant];
+    const surface = () => {
+      const cloud = cloudOf(samplerFor(points), SURFACE, {}, OTHER_SEED);
+      return { ...cloud, deviation: noise * diagonal(cloud) };
+    };
+    return {
+      cloud: () => cloudOf(samplerFor(points), points, VARIANTS[variant], seed),
+      large: !noise && !keep && (() => cloudOf(samplerFor(large), large, {}, seed).positions),
+      surface: noise >= LEAST_NOISE && surface,
+    };
+  };
   return [
     ...rows.map(({ name, variant }) => {
       const { shape, open = false, sides = true, kind = 'shape' } = SHAPES[name];
-      const cloud = () => cloudOf(shape(points), points, VARIANTS[variant], 1 + shapes.indexOf(name));
-      return { name, variant, kind, open, sides, cloud };
+      return { name, variant, kind, open, sides, ...clouds(shape, variant, 1 + shapes.indexOf(name)) };
     }),
     ...meshes.flatMap(({ name, about, corners, sampler }) => {
       const walls = once(() => wallsOf(corners, cloudOf(sampler, points, {}, MESH_SEED)));
@@ -80,7 +103,7 @@ export function plannedRows({ rows, points, meshVariants }, meshes, scans = []) 
         kind: 'mesh',
         open: false,
         sides: true,
-        cloud: () => cloudOf(sampler, points, VARIANTS[variant], MESH_SEED),
+        ...clouds(() => sampler, variant, MESH_SEED),
         // The noisy points are those of the clean cloud, moved.
         walls: VARIANTS[variant].noise && (() => walls().map((wall) => wall / VARIANTS[variant].noise)),
       }));
@@ -115,7 +138,7 @@ function once(job) {
 export async function measureAll(estimator, rows, { tell, peers }) {
   await warmUp(estimator);
   const results = [];
-  for (const { cloud, walls, ...row } of rows) {
+  for (const { cloud, large, surface, walls, ...row } of rows) {
     tell(`${row.name}, ${row.variant}`);
     const { positions, normals: truth } = cloud();
     const thick = walls?.().map((wall) => wall > THICK);
@@ -134,9 +157,30 @@ export async function measureAll(estimator, rows, { tell, peers }) {
       modes[mode] = { signs, components: components.count, largest: components.largest[0], seconds };
     }
     const others = row.sides && (await peers?.(row, { positions, normals: truth }));
-    results.push({ ...row, points: positions.length / 3, lines, modes, ...(others && { peers: others }) });
+    const result = { ...row, points: positions.length / 3, lines, modes, ...(others && { peers: others }) };
+    if (large) result.large = (await timed(estimator, large(), { orient: MODES[0] })).seconds.orientation;
+    if (surface && verdicts(result).some(({ met }) => !met))
+      result.attainable = attainable({ positions, normals: truth }, surface(), thick);
+    results.push(result);
   }
   return results;
+}
+
+/** The shares of right signs, of all points and of those before thick and thin walls, that who knows the surface has. */
+function attainable({ positions, normals }, surface, thick) {
+  const direction = likeliest(surface, surface.deviation);
+  const shareOf = (counts) => {
+    const points = Array.from({ length: positions.length / 3 }, (_, i) => i).filter(counts);
+    const tried = points.filter((_, i) => i % Math.ceil(points.length / TRIED) === 0);
+    const of = (array, point) => [...array.subarray(3 * point, 3 * point + 3)];
+    const directions = tried.flatMap((point) => direction(of(positions, point)));
+    return rightSigns(
+      directions,
+      tried.flatMap((point) => of(normals, point)),
+    ).share;
+  };
+  const parts = thick && { thick: shareOf((i) => thick[i] === 1), thin: shareOf((i) => thick[i] === 0) };
+  return { all: shareOf(() => true), ...parts };
 }
 
 /** The engine compiles what is hot once more, better: not during what counts. */

@@ -3,10 +3,11 @@
 import { median } from '../median.mjs';
 import { paragraphs, percent, sources, table, verdict } from '../format.mjs';
 import { MOST_SECONDS, counted, verdicts } from './judge.mjs';
-import { ENOUGH, MODES, RUNS, THICK } from './measure.mjs';
+import { ENOUGH, LEAST_NOISE, MODES, RUNS, THICK, TRIED } from './measure.mjs';
 
 /** Never rounded up: all right is told from nearly all. */
 const share = (value) => `${value === 1 ? '100' : (Math.floor(1e5 * value + 1e-6) / 1e3).toFixed(3)} %`;
+const hundredths = (value) => `${(Math.floor(1e4 * value) / 100).toFixed(2)} %`;
 const asPercent = (value) => `${Number((100 * value).toFixed(1))} %`;
 const seconds = (value) => value.toFixed(3);
 const degrees = (value) => value.toFixed(2);
@@ -20,7 +21,7 @@ export function report(rows, { machine, minutes, hasFolder, skipped, notes }) {
   return `${paragraphs(
     '# Orientation, measured',
     "Signs by `orient: 'consistent'` and `'outward'` against true ones, on generated shapes, on points sampled on meshes, and on range scans. Written by `npm run orientation`, text and all; not to be edited.",
-    `${model}, ${cores} cores, Node ${node}, ${date}; took ${minutes.toFixed(1)} minutes. Shares are of the points with a true normal, and never rounded up; a point without a normal is not right. Normals must point outwards; those of an open surface, marked ○, either all to one side or all to the other. Scenes (scene, view) are what scanners see of a corner of a room with furniture in it (benches/orientation/scene.mjs): normals must face them. Clear: without the points whose normal is more than 60 degrees off the true one, either way; at sharp edges and in noise these have the normal of another face, and their sign says little. What is asked counts all points. Off: how far the lines of the normals are off the true ones, whatever their signs, in degrees, root mean square, without orientation and with it, which averages normals in noise. Times are of WebAssembly in Node with one thread, in seconds for a million points, the fastest of ${RUNS} runs, or of fewer where these take more than ${ENOUGH / 1_000} seconds.`,
+    `${model}, ${cores} cores, Node ${node}, ${date}; took ${minutes.toFixed(1)} minutes. Shares are of the points with a true normal, and never rounded up; a point without a normal is not right. Normals must point outwards; those of an open surface, marked ○, either all to one side or all to the other. Scenes (scene, view) are what scanners see of a corner of a room with furniture in it (benches/orientation/scene.mjs): normals must face them. Clear: without the points whose normal is more than 60 degrees off the true one, either way; at sharp edges and in noise these have the normal of another face, and their sign says little. What is asked counts all points. Off: how far the lines of the normals are off the true ones, whatever their signs, in degrees, root mean square, without orientation and with it, which averages normals in noise. Times are of WebAssembly in Node with one thread, in seconds for a million points, the fastest of ${RUNS} runs, or of fewer where these take more than ${ENOUGH / 1_000} seconds; “a million” is that of ${MODES[0]} signs of as many points of the same surface. Attainable: what who knows the surface, and how large the noise is, reaches by the direction on whose side a noisy point most likely lies, whatever its line, told for ${TRIED} points of rows with noise of ${percent(LEAST_NOISE)} and more that miss something (benches/orientation/attainable.mjs).`,
     `Noise is normally distributed, its standard deviation a share of the diagonal of the box; stripes and gradient are patterns of density (benches/accuracy/clouds.mjs). A wall is thick that is more than ${THICK} times the deviation of the noise, along the inward normal, or that has no other side.`,
     '## In short',
     overview(rows),
@@ -49,6 +50,7 @@ function overview(rows) {
           asPercent(worst.least),
           `${share(worst.share)} (${fullName(worst.row)})`,
           `${met} of ${group.length}`,
+          attainableIn(worst.row, worst.part),
           verdict(met === group.length),
         ],
       ];
@@ -62,17 +64,30 @@ function overview(rows) {
       MOST_SECONDS,
       `${seconds(slowest.modes[mode].seconds.orientation)} (${fullName(slowest)})`,
       `${met} of ${rows.length}`,
+      '',
       verdict(met === rows.length),
     ];
   });
-  return table(['what', 'asked', 'worst', 'rows that meet it', 'verdict'], [...signs, ...times]);
+  const large = rows.filter((row) => row.large);
+  if (large.length > 0) {
+    const slowest = least(large, (row) => -row.large);
+    const met = large.filter((row) => row.large <= MOST_SECONDS).length;
+    const what = `seconds for a million points, clean clouds of so many: ${MODES[0]}`;
+    const worst = `${seconds(slowest.large)} (${fullName(slowest)})`;
+    times.push([what, MOST_SECONDS, worst, `${met} of ${large.length}`, '', verdict(met === large.length)]);
+  }
+  return table(['what', 'asked', 'worst', 'rows that meet it', 'attainable there', 'verdict'], [...signs, ...times]);
 }
+
+/** What who knows the surface reaches of a part of a row's points, where that was asked. */
+const attainableIn = ({ attainable }, part) => (attainable?.[part] >= 0 ? hundredths(attainable[part]) : '');
 
 /** One line for each row whose sides are known. */
 export function details(rows) {
   const known = rows.filter(({ sides }) => sides);
   if (known.length === 0) return '';
   const hasWalls = known.some((row) => row.modes[MODES[0]].signs.thick);
+  const hasLarge = known.some((row) => row.large);
   const part = (row, name) =>
     MODES.map((mode) => {
       const signs = row.modes[mode].signs[name];
@@ -97,6 +112,7 @@ export function details(rows) {
       ...MODES.map((mode) => `largest: ${mode}`),
       ...MODES.map((mode) => `s: ${mode}`),
       's: all',
+      ...(hasLarge ? ['s: a million'] : []),
       'off: none',
       'off: consistent',
     ],
@@ -107,6 +123,7 @@ export function details(rows) {
       judged(row),
       ...(hasWalls ? thick(row) : []),
       ...facts(row),
+      ...(hasLarge ? [row.large ? seconds(row.large) : ''] : []),
       degrees(row.lines.none),
       degrees(row.lines.consistent),
     ]),
@@ -121,7 +138,9 @@ function judged(row) {
   if (missed.length === 0) return `${asked}: met`;
   const modes = MODES.filter((mode) => missed.some((verdict) => verdict.mode === mode));
   const isClearMet = missed.every(({ clear }) => clear);
-  return `${asked}: **missed** by ${modes.join(' and ')}${isClearMet ? ', met where clear' : ''}`;
+  const parts = [...new Set(missed.map(({ part }) => part))].filter((part) => attainableIn(row, part));
+  const attainable = parts.map((part) => `${part === 'all' ? '' : `${part}: `}${attainableIn(row, part)}`).join(', ');
+  return `${asked}: **missed** by ${modes.join(' and ')}${isClearMet ? ', met where clear' : ''}${attainable && `; attainable ${attainable}`}`;
 }
 
 const facts = ({ modes }) => {
