@@ -27,16 +27,29 @@ pub(super) struct Near {
     pub cube: u32,
 }
 
-/// What lies between the first of 8x8 places and each of them, in three of four lanes.
-const STEPS: [Vec4; 64] = {
+/// The bits of a word that are three rows of three places, and five of five; the first place is bit 0.
+const CLOSE_ROWS: u64 = 0x0007_0707;
+const LAYER_ROWS: u64 = 0x001F_1F1F_1F1F;
+
+/// Three layers of three rows lie in one word, so many bits apart.
+const CLOSE_BITS: u32 = 20;
+
+/// For each bit of the 27 places round one, and of the lowest layer of the 125, what lies between that one and the place, in three
+/// of four lanes; in the last, as bits, how many places after the first it is.
+const CLOSE: [Vec4; 64] = steps(1.0, CLOSE_BITS);
+const LAYER: [Vec4; 64] = steps(2.0, 64);
+
+const fn steps(reach: f32, bits: u32) -> [Vec4; 64] {
     let mut steps = [Vec4::ZERO; 64];
-    let mut i = 0;
-    while i < 64 {
-        steps[i] = Vec4::new((i % 8) as f32, (i / 8) as f32, 0.0, 0.0);
-        i += 1;
+    let mut bit = 0;
+    while bit < 64 {
+        let (x, y, z) = (bit % bits % 8, bit % bits / 8, bit / bits);
+        let place = f32::from_bits(x + 8 * y + 64 * z);
+        steps[bit as usize] = Vec4::new(x as f32 - reach, y as f32 - reach, z as f32 - reach, place);
+        bit += 1;
     }
     steps
-};
+}
 
 impl Around {
     pub fn new() -> Self {
@@ -72,23 +85,45 @@ impl Around {
         }
         let corner = UVec3::new(bit & 3, bit >> 2 & 3, bit >> 4) + 2 - reach;
         let shift = corner.x + 8 * corner.y;
-        let rows: u64 = if reach == 1 { 0x0007_0707 } else { 0x001F_1F1F_1F1F };
-        let mut count = 0;
-        for z in 0..=2 * reach {
-            let first = 64 * (corner.z + z);
-            let row = Vec4::new(0.0, 0.0, z as f32, 0.0) - reach as f32;
-            for near in set_bits(self.occupied[first as usize / 64] >> shift & rows) {
-                // It never is more, but so the compiler knows.
-                let cube = self.cubes[(first + shift + near) as usize % 512];
-                self.list[count] = bytemuck::cast((STEPS[near as usize] + row).with_w(f32::from_bits(cube)));
-                count += 1;
+        let word = |z: u32| self.occupied[(corner.z + z) as usize] >> shift;
+        let mut list = Filled { cubes: &self.cubes, list: &mut self.list, count: 0 };
+        if reach == 1 {
+            // At once: nothing foretells where the bits of a word end.
+            let layer = |z: u32| (word(z) & CLOSE_ROWS) << (CLOSE_BITS * z);
+            list.add(layer(0) | layer(1) | layer(2), &CLOSE, shift + 64 * corner.z, Vec4::ZERO);
+        } else {
+            for z in 0..5 {
+                let up = Vec4::new(0.0, 0.0, z as f32, 0.0);
+                list.add(word(z) & LAYER_ROWS, &LAYER, shift + 64 * (corner.z + z), up);
             }
         }
+        let count = list.count;
         &self.list[..count]
     }
 
     fn place(bit: u32) -> usize {
         (146 + (bit & 3) + 8 * (bit >> 2 & 3) + 64 * (bit >> 4)) as usize
+    }
+}
+
+/// The first part of a list.
+struct Filled<'a> {
+    cubes: &'a [u32; 512],
+    list: &'a mut [Near; 125],
+    count: usize,
+}
+
+impl Filled<'_> {
+    /// Appends the cubes of some bits, `up` higher than `steps` say; the first place is that of bit 0.
+    #[inline(always)]
+    fn add(&mut self, bits: u64, steps: &[Vec4; 64], first: u32, up: Vec4) {
+        for bit in set_bits(bits) {
+            let step = steps[bit as usize];
+            // It never is more, but so the compiler knows.
+            let cube = self.cubes[(first + step.w.to_bits()) as usize % 512];
+            self.list[self.count] = bytemuck::cast((step + up).with_w(f32::from_bits(cube)));
+            self.count += 1;
+        }
     }
 }
 
