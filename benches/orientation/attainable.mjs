@@ -19,14 +19,17 @@ const ROUNDS = 4;
  * gives to what lies between the two.
  */
 export function likeliest({ positions, normals }, deviation) {
-  const near = search(positions, REACH * deviation);
+  const [reach, variance] = [REACH * deviation, deviation * deviation];
+  const near = search(positions, reach);
   const { kinds, count } = alike(normals);
   const sums = new Float64Array(4 * count);
   return (place) => {
     const met = new Set();
     near(place, (j) => {
-      const [x, y, z] = [0, 1, 2].map((axis) => positions[3 * j + axis] - place[axis]);
-      const weight = Math.exp((x * x + y * y + z * z) / (-2 * deviation * deviation));
+      let square = 0;
+      for (let axis = 0; axis < 3; axis++) square += (positions[3 * j + axis] - place[axis]) ** 2;
+      if (square > reach * reach) return;
+      const weight = Math.exp(square / (-2 * variance));
       const kind = 4 * kinds[j];
       met.add(kind);
       sums[kind] += weight;

@@ -34,8 +34,8 @@ const LAYER_ROWS: u64 = 0x001F_1F1F_1F1F;
 /// Three layers of three rows lie in one word, so many bits apart.
 const CLOSE_BITS: u32 = 20;
 
-/// For each bit of the 27 places round one, and of the lowest layer of the 125, what lies between that one and the place, in three
-/// of four lanes; in the last, as bits, how many places after the first it is.
+/// For each bit of the 27 places round one, and of the lowest layer of the 125, the step from that one to the place, in three of
+/// four lanes; in the last, as bits, how many places it stands after the first.
 const CLOSE: [Vec4; 64] = steps(1.0, CLOSE_BITS);
 const LAYER: [Vec4; 64] = steps(2.0, 64);
 
