@@ -7,7 +7,7 @@ use crate::grid::Grid;
 use crate::lattice::{BRICK, cube_place};
 use crate::lists::{filled, reserve};
 use crate::median::ranked;
-use crate::parallel::Gathering;
+use crate::parallel::{Filling, Gathering};
 use crate::progress::Stage;
 use crate::surroundings::STEPS;
 use glam::{IVec3, Vec3};
@@ -80,7 +80,7 @@ pub(super) fn sights(grid: &Grid, patches: &Patches, points: usize, stage: &Stag
     reserve(&mut seen, grid.cubes(), WHAT)?;
     seen.resize_with(grid.cubes(), AtomicU32::default);
     let failures = Gathering::new(WHAT);
-    stage.run_in(1, DIRECTIONS, &|number| {
+    stage.part(0.0..0.7).run_in(1, DIRECTIONS, &|number| {
         let see = |cube: usize| {
             seen[cube].fetch_or(1 << number, Relaxed);
         };
@@ -91,23 +91,29 @@ pub(super) fn sights(grid: &Grid, patches: &Patches, points: usize, stage: &Stag
     if let Some(error) = failures.all()?.pop() {
         return Err(error);
     }
-    let mut sights = Sights { exposure: Vec::new(), all: Vec::new() };
-    reserve(&mut sights.exposure, patches.all.len(), WHAT)?;
-    reserve(&mut sights.all, patches.all.len(), WHAT)?;
-    for (cube, seen) in seen.into_iter().enumerate() {
-        let seen = seen.into_inner();
-        // In one direction only: through a gap between cubes that touch at an edge.
-        let seen = if seen.count_ones() < 2 { 0 } else { seen };
-        let own = &patches.all[patches.of_cube(cube)];
-        for patch in own {
-            let seen = set_bits(seen.into()).filter(|&number| !is_hidden(patch, own, direction(number as usize)));
-            let seen = seen.fold(0, |seen: u32, number| seen | 1 << number);
-            let along = |number: u32| (direction(number as usize).as_vec3().normalize().dot(patch.normal) / HALF).abs();
-            sights.exposure.push(openness(seen).dot(patch.normal));
-            sights.all.push(set_bits(seen.into()).map(along).sum());
+    let units: [Vec3; DIRECTIONS] = std::array::from_fn(|number| direction(number).as_vec3().normalize());
+    let (exposures, sums) = (Filling::new(patches.all.len(), WHAT)?, Filling::new(patches.all.len(), WHAT)?);
+    stage.part(0.7..1.0).run(grid.blocks.len(), &|block| {
+        for (_, cube, _) in grid.cubes_in(block) {
+            let seen = seen[cube].load(Relaxed);
+            // In one direction only: through a gap between cubes that touch at an edge.
+            let seen = if seen.count_ones() < 2 { 0 } else { seen };
+            let range = patches.of_cube(cube);
+            let own = &patches.all[range.clone()];
+            for (number, patch) in range.zip(own) {
+                let is_seen = |&number: &u32| own.len() == 1 || !is_hidden(patch, own, direction(number as usize));
+                let seen = set_bits(seen.into()).filter(is_seen).fold(0, |seen: u32, number| seen | 1 << number);
+                let along = |number: u32| (units[number as usize].dot(patch.normal) / HALF).abs();
+                // SAFETY: a patch belongs to one cube, and a cube to one block.
+                unsafe {
+                    exposures.write(number, openness(seen).dot(patch.normal));
+                    sums.write(number, set_bits(seen.into()).map(along).sum());
+                }
+            }
         }
-    }
-    Ok(sights)
+    })?;
+    // SAFETY: the blocks hold all cubes, and these all patches.
+    Ok(unsafe { Sights { exposure: exposures.complete(), all: sums.complete() } })
 }
 
 /// Whether in a direction another patch of the cube hides from one what lies beyond: its plane lies there, and the direction
