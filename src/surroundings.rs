@@ -20,19 +20,11 @@ impl Surroundings {
     /// Looks up the cubes of brick `brick` and those beside them, in the 27 bricks around and in place of it.
     pub fn look(&mut self, grid: &Grid, brick: usize) {
         self.occupied = Places::NONE;
-        let (place, own) = (grid.bricks.places[brick], grid.masks[brick]);
-        for (Side { step, facing, shift }, opposite) in SIDES.iter().zip(SIDES.iter().rev()) {
-            // Only what lies beside cubes of the brick is asked for. The last steps are the opposites of the first.
-            if own & opposite.facing == 0 {
-                continue;
-            }
-            let Some(number) = grid.bricks.number(place + step) else { continue };
-            for bit in set_bits(grid.masks[number as usize] & facing) {
-                let place = Places::of_cube(bit).wrapping_add_signed(*shift);
-                self.occupied.insert(place);
-                self.cubes[place] = grid.cube(number as usize, bit);
-            }
-        }
+        each_beside(grid, brick, &SIDES, |bit, shift, cube| {
+            let place = Places::of_cube(bit).wrapping_add_signed(shift);
+            self.occupied.insert(place);
+            self.cubes[place] = cube;
+        });
     }
 
     /// The number of the cube at an occupied place.
@@ -149,14 +141,31 @@ pub(crate) const STEPS: [IVec3; 27] = {
 /// A brick next to another, or that itself.
 pub(crate) struct Side {
     /// How many bricks away.
-    pub step: IVec3,
+    step: IVec3,
     /// Its cubes that are near the other brick.
-    pub facing: u64,
+    facing: u64,
     /// From the place of a cube of the other brick to that of the same cube of this one.
-    pub shift: isize,
+    shift: isize,
 }
 
 const SIDES: [Side; 27] = sides(1);
+
+/// Calls `each` with every cube in a brick and, of those round it, beside cubes of the brick: with its bit in its own brick,
+/// what lies between its place and that of the same cube of `brick`, and its number. `sides` are those of some depth.
+#[inline(always)]
+pub(crate) fn each_beside(grid: &Grid, brick: usize, sides: &[Side; 27], mut each: impl FnMut(u32, isize, u32)) {
+    let (place, own) = (grid.bricks.places[brick], grid.masks[brick]);
+    for (Side { step, facing, shift }, opposite) in sides.iter().zip(sides.iter().rev()) {
+        // Only what lies beside cubes of the brick is asked for. The last steps are the opposites of the first.
+        if own & opposite.facing == 0 {
+            continue;
+        }
+        let Some(number) = grid.bricks.number(place + step) else { continue };
+        for bit in set_bits(grid.masks[number as usize] & facing) {
+            each(bit, *shift, grid.cube(number as usize, bit));
+        }
+    }
+}
 
 /// A brick and those round it, with their cubes at most `depth` away from it; places are numbered along x, y, z in a cube
 /// of `4 + 2 depth` of them.

@@ -2,7 +2,7 @@
 
 use crate::bricks::set_bits;
 use crate::grid::Grid;
-use crate::surroundings::{Side, sides};
+use crate::surroundings::{Side, each_beside, sides};
 use bytemuck::{Pod, Zeroable};
 use glam::{UVec3, Vec3, Vec4};
 
@@ -62,19 +62,11 @@ impl Around {
     fn look(&mut self, grid: &Grid, brick: usize) {
         self.brick = brick;
         self.occupied = [0; 8];
-        let own = grid.masks[brick];
-        for (Side { step, facing, shift }, opposite) in SIDES.iter().zip(SIDES.iter().rev()) {
-            // Only what lies near cubes of the brick is asked for. The last steps are the opposites of the first.
-            if own & opposite.facing == 0 {
-                continue;
-            }
-            let Some(number) = grid.bricks.number(grid.bricks.places[brick] + step) else { continue };
-            for bit in set_bits(grid.masks[number as usize] & facing) {
-                let place = Self::place(bit).wrapping_add_signed(*shift);
-                self.occupied[place / 64] |= 1 << (place % 64);
-                self.cubes[place] = grid.cube(number as usize, bit);
-            }
-        }
+        each_beside(grid, brick, &SIDES, |bit, shift, cube| {
+            let place = Self::place(bit).wrapping_add_signed(shift);
+            self.occupied[place / 64] |= 1 << (place % 64);
+            self.cubes[place] = cube;
+        });
     }
 
     /// The occupied cubes at most `reach` (1 or 2) away from the cube with bit `bit` of a brick, in the order of their
