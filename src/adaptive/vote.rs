@@ -292,7 +292,7 @@ impl Voters {
 }
 
 /// Four votes on the normal at a point, lane by lane.
-#[derive(Clone)]
+#[derive(Default)]
 struct Votes {
     weight: Vec4,
     normal: [Vec4; 3],
@@ -300,11 +300,6 @@ struct Votes {
     height: Vec4,
     /// What makes a unit vector of the gradient.
     scale: Vec4,
-}
-
-impl Votes {
-    /// Before anybody was asked.
-    const NONE: Self = Self { weight: Vec4::ZERO, normal: [Vec4::ZERO; 3], height: Vec4::ZERO, scale: Vec4::ZERO };
 }
 
 /// The vote that counts most.
@@ -345,7 +340,7 @@ impl Ballot {
             self.voters.push(Voters::of([first, next(), next(), next()], reference));
         }
         // Here, and not while they speak: what may have to grow keeps nothing in registers.
-        self.votes.resize(self.voters.len(), Votes::NONE);
+        self.votes.resize_with(self.voters.len(), Votes::default);
     }
 
     /// Asks about a point. The vote that counts most, if there are any.
