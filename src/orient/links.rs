@@ -10,7 +10,6 @@ use crate::parallel::Filling;
 use crate::progress::Stage;
 use crate::surroundings::{NEAR, Places, STEPS, Surroundings};
 use glam::{Vec3, Vec4, Vec4Swizzles};
-use std::ops::Range;
 
 /// What errors call the memory of the links.
 pub(super) const GRAPH: &str = "the graph of patches";
@@ -98,13 +97,8 @@ impl Links {
                             }
                             let other = &patches.all[to];
                             if is_clean && (patch.has_rival || other.has_rival) && place != Places::NEAR_CENTRE {
-                                let step = NEAR[place as usize % 64].xyz();
-                                let share = |a: &Patch, b: &Patch, of_cube: Range<usize>, step: Vec3| {
-                                    if b.has_rival { share(a, b, &patches.all[of_cube], step) } else { 1.0 }
-                                };
-                                // One product, so that it is the same to the bit from both ends.
-                                evidence *= share(patch, other, of_place(place), step)
-                                    * share(other, patch, all.clone(), -step);
+                                let beside = [all.clone(), of_place(place)].map(|cube| &patches.all[cube]);
+                                evidence *= shares([patch, other], beside, NEAR[place as usize % 64].xyz());
                             }
                             links.push(Link { to: to as u32, evidence });
                         }
@@ -252,6 +246,16 @@ impl Four {
         // In one place: between centres less than a fiftieth of an edge apart there is no line, only two normals that cross.
         Vec4::select(square.cmplt(Vec4::splat(4e-4)), alike * alike * alike, evidence)
     }
+}
+
+/// What is left of the evidence between two patches where either has rivals among those of its cube; the second cube lies `step`
+/// from the first.
+#[inline(always)]
+fn shares([a, b]: [&Patch; 2], [of_a, of_b]: [&[Patch]; 2], step: Vec3) -> f32 {
+    let from_a = if b.has_rival { share(a, b, of_b, step) } else { 1.0 };
+    let from_b = if a.has_rival { share(b, a, of_a, -step) } else { 1.0 };
+    // One product, so that it is the same to the bit from both ends.
+    from_a * from_b
 }
 
 /// A sheet goes on in one sheet: what is left of the evidence between two patches, from 1 down to 0, where a rival of the
