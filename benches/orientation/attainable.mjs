@@ -14,11 +14,11 @@ const ROUNDS = 4;
 
 /**
  * Answers for a place the direction whose side is most likely the right one for a point that was found there, one of a surface
- * with noise of a deviation. `surface`: `{ positions, normals }` of points without noise, evenly spread, and so many that
- * there are many within a deviation. Each may be where the point comes from, with the weight that the normal distribution
+ * with noise of a deviation. `positions` and `normals` are of points without noise, evenly spread, and so many that there are
+ * many within a deviation. Each may be where the point comes from, with the weight that the normal distribution
  * gives to what lies between the two.
  */
-export function likeliest({ positions, normals }, deviation) {
+export function likeliest({ positions, normals, deviation }) {
   const [reach, variance] = [REACH * deviation, deviation * deviation];
   const near = search(positions, reach);
   const { kinds, count } = alike(normals);

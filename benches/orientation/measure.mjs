@@ -16,9 +16,8 @@ export const ENOUGH = 3_000;
 /** A wall is thick that is more than so many times the deviation of the noise. */
 export const THICK = 10;
 
-/** What is attainable is told with so much noise and more, by so many points of the surface, for so many of the cloud. */
+/** What is attainable is told with so much noise and more, for so many points. */
 export const LEAST_NOISE = 0.006;
-const SURFACE = 300_000;
 export const TRIED = 5_000;
 
 const MESH_SEED = 101;
@@ -27,13 +26,14 @@ const OTHER_SEED = 777;
 /** Of a mesh's surface more may not lie inside of it: its signs would be a matter of opinion. */
 const MOST_HIDDEN = 0.02;
 
-/** How much is measured. */
+/** How much is measured. `large`: the points of large clouds; `surface`: those that stand for a surface. */
 export const FULL = {
   rows: Object.entries(SHAPES).flatMap(([name, { noise = 'noise0.6' }]) =>
     ['clean', noise].map((variant) => ({ name, variant })),
   ),
   points: 100_000,
   large: 1_000_000,
+  surface: 300_000,
   meshVariants: Object.keys(VARIANTS),
 };
 /** For tests: seconds. */
@@ -41,6 +41,7 @@ export const SMALL = {
   rows: ['sphere', 'terrain', 'moebius'].map((name) => ({ name, variant: 'clean' })),
   points: 15_000,
   large: 30_000,
+  surface: 30_000,
   meshVariants: ['clean', 'noise0.6'],
 };
 
@@ -75,18 +76,18 @@ export function withOutside(read) {
  * surface and of its noise, and noisy meshes `walls`, which answers how thick the wall behind each point is, in deviations of the
  * noise. `scans`: `{ name, about, positions, normals }`.
  */
-export function plannedRows({ rows, points, large, meshVariants }, meshes, scans = []) {
+export function plannedRows({ rows, points, large, surface, meshVariants }, meshes, scans = []) {
   const shapes = Object.keys(SHAPES);
   const clouds = (samplerFor, variant, seed) => {
     const { noise = 0, keep } = VARIANTS[variant];
-    const surface = () => {
-      const cloud = cloudOf(samplerFor(points), SURFACE, {}, OTHER_SEED);
+    const known = () => {
+      const cloud = cloudOf(samplerFor(points), surface, {}, OTHER_SEED);
       return { ...cloud, deviation: noise * diagonal(cloud) };
     };
     return {
       cloud: () => cloudOf(samplerFor(points), points, VARIANTS[variant], seed),
       large: !noise && !keep && (() => cloudOf(samplerFor(large), large, {}, seed).positions),
-      surface: noise >= LEAST_NOISE && surface,
+      surface: noise >= LEAST_NOISE && known,
     };
   };
   return [
@@ -140,48 +141,50 @@ export async function measureAll(estimator, rows, { tell, peers }) {
   const results = [];
   for (const { cloud, large, surface, walls, ...row } of rows) {
     tell(`${row.name}, ${row.variant}`);
-    const { positions, normals: truth } = cloud();
-    const thick = walls?.().map((wall) => wall > THICK);
+    const measured = cloud();
+    const { positions, normals: truth } = measured;
+    const parts = partsOf(walls && walls().map((wall) => wall > THICK));
     const off = (normals) => summary(angles(normals, truth)).rms;
     const lines = { none: off((await estimator.estimateNormals(positions)).normals) };
     const modes = {};
     for (const mode of MODES) {
       const { normals, report, seconds } = await timed(estimator, positions, { orient: mode });
-      const signs = { all: rightSigns(normals, truth) };
-      if (thick) {
-        signs.thick = rightSigns(normals, truth, (i) => thick[i] === 1);
-        signs.thin = rightSigns(normals, truth, (i) => thick[i] === 0);
-      }
+      const signs = mapValues(parts, (counts) => rightSigns(normals, truth, counts));
       lines[mode] = off(normals);
       const { components } = report;
       modes[mode] = { signs, components: components.count, largest: components.largest[0], seconds };
     }
-    const others = row.sides && (await peers?.(row, { positions, normals: truth }));
+    const others = row.sides && (await peers?.(row, measured));
     const result = { ...row, points: positions.length / 3, lines, modes, ...(others && { peers: others }) };
     if (large) result.large = (await timed(estimator, large(), { orient: MODES[0] })).seconds.orientation;
-    if (surface && verdicts(result).some(({ met }) => !met))
-      result.attainable = attainable({ positions, normals: truth }, surface(), thick);
+    const missed = new Set(verdicts(result).flatMap(({ part, met }) => (met ? [] : [part])));
+    if (surface && missed.size > 0) {
+      const direction = likeliest(surface());
+      const shares = [...missed].map((part) => [part, attainable(measured, direction, parts[part])]);
+      result.attainable = Object.fromEntries(shares);
+    }
     results.push(result);
   }
   return results;
 }
 
-/** The shares of right signs, of all points and of those before thick and thin walls, that who knows the surface has. */
-function attainable({ positions, normals }, surface, thick) {
-  const direction = likeliest(surface, surface.deviation);
-  const shareOf = (counts) => {
-    const points = Array.from({ length: positions.length / 3 }, (_, i) => i).filter(counts);
-    const tried = points.filter((_, i) => i % Math.ceil(points.length / TRIED) === 0);
-    const of = (array, point) => [...array.subarray(3 * point, 3 * point + 3)];
-    const directions = tried.flatMap((point) => direction(of(positions, point)));
-    return rightSigns(
-      directions,
-      tried.flatMap((point) => of(normals, point)),
-    ).share;
-  };
-  const parts = thick && { thick: shareOf((i) => thick[i] === 1), thin: shareOf((i) => thick[i] === 0) };
-  return { all: shareOf(() => true), ...parts };
+/** Which points are of each part that something is asked of; `thick` tells of each whether the wall behind it is. */
+const partsOf = (thick) => ({
+  all: () => true,
+  ...(thick && { thick: (i) => thick[i] === 1, thin: (i) => thick[i] === 0 }),
+});
+
+/** The share of right signs that who knows the surface has, for points of which `counts` answers true. */
+function attainable({ positions, normals }, direction, counts) {
+  const points = Array.from({ length: positions.length / 3 }, (_, i) => i).filter(counts);
+  const tried = points.filter((_, i) => i % Math.ceil(points.length / TRIED) === 0);
+  const of = (vectors, point) => [...vectors.subarray(3 * point, 3 * point + 3)];
+  const directions = tried.flatMap((point) => direction(of(positions, point)));
+  const truth = tried.flatMap((point) => of(normals, point));
+  return rightSigns(directions, truth).share;
 }
+
+const mapValues = (object, job) => Object.fromEntries(Object.entries(object).map(([key, value]) => [key, job(value)]));
 
 /** The engine compiles what is hot once more, better: not during what counts. */
 async function warmUp(estimator) {

@@ -91,6 +91,20 @@ describe('the small run', () => {
     assert.equal(find('box', 'clean').modes.outward.signs.thick, undefined);
   });
 
+  test('tells what is attainable of what is missed', async () => {
+    const { meshes } = meshesOf({ box: [BOX] });
+    const row = plannedRows(SMALL, meshes).find(({ name, variant }) => name === 'box' && variant === 'noise0.6');
+    const inside = (cloud) => ({ ...cloud, normals: cloud.normals.map((value) => -value) });
+    const turned = { ...row, cloud: () => inside(row.cloud()), surface: () => inside(row.surface()) };
+    const wrong = { ...row, cloud: () => inside(row.cloud()) };
+    const [right, ...missed] = await measureAll(estimator.own, [row, turned, wrong], { tell: () => {} });
+    assert.equal(right.attainable, undefined);
+    // A few points lie closer to a face that they are not of.
+    const [known, unknown] = missed.map(({ attainable }) => attainable);
+    assert.deepEqual([Object.keys(known), Object.keys(unknown)], [['thick'], ['thick']]);
+    assert.ok(known.thick > 0.999 && unknown.thick < 0.001, `${known.thick}, ${unknown.thick}`);
+  });
+
   test('tells how far lines are off, and that only noise lets signs change them', () => {
     for (const { variant, lines } of rows) {
       assert.deepEqual(Object.keys(lines), ['none', ...MODES]);
@@ -173,10 +187,10 @@ describe('the direction whose side is most likely right', () => {
       steps.flatMap((a) => steps.flatMap((b) => at.map((value, axis) => value + a * u[axis] + b * v[axis]))),
     );
     const normals = faces.flatMap(({ normal }) => Array.from({ length: 80 * 80 }, () => normal).flat());
-    return { positions: new Float32Array(positions), normals: new Float32Array(normals) };
+    return { positions: new Float32Array(positions), normals: new Float32Array(normals), deviation: 0.2 };
   };
   const plate = (z, normal) => ({ at: [0, 0, z], u: [1, 0, 0], v: [0, 1, 0], normal });
-  const near = ([above, below], place) => dot(likeliest(surface(above, below), 0.2)(place), above.normal) > 0;
+  const near = ([above, below], place) => dot(likeliest(surface(above, below))(place), above.normal) > 0;
 
   test('is that of the nearer face of a wall', () => {
     const wall = [plate(0.2, [0, 0, 1]), plate(-0.2, [0, 0, -1])];
@@ -193,7 +207,7 @@ describe('the direction whose side is most likely right', () => {
       [0.3, 0, -0.3],
       [0.1, 0, 0.3],
     ]) {
-      const direction = likeliest(surface(floor, roof), 0.2)(place);
+      const direction = likeliest(surface(floor, roof))(place);
       assert.ok(dot(direction, floor.normal) > 0 && dot(direction, roof.normal) > 0, `${direction}`);
     }
   });
