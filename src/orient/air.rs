@@ -101,7 +101,8 @@ pub(super) fn sights(grid: &Grid, patches: &Patches, points: usize, stage: &Stag
             let range = patches.of_cube(cube);
             let own = &patches.all[range.clone()];
             for (number, patch) in range.zip(own) {
-                let is_seen = |&number: &u32| !is_hidden(patch, own, direction(number as usize));
+                // Mostly it is alone, and does not hide itself.
+                let is_seen = |&number: &u32| own.len() == 1 || !is_hidden(patch, own, direction(number as usize));
                 let seen = set_bits(seen.into()).filter(is_seen).fold(0, |seen: u32, number| seen | 1 << number);
                 let along = |number: u32| (units[number as usize].dot(patch.normal) / HALF).abs();
                 // SAFETY: a patch belongs to one cube, and a cube to one block.
