@@ -202,7 +202,7 @@ fn adaptive(mut points: Points, cloud: &Cloud, options: &Options, mut laps: Laps
     let lattice = Lattice::new(&bounds, &|| density.middle, density.edge(cell::POINTS_PER_CELL), adaptive::CUBES);
     laps.end("cellSize");
     let lap = &mut |phase| laps.end(phase);
-    let answer = adaptive::normals(points, &lattice, &frame, options.curvature, progress, lap)?;
+    let answer = adaptive::normals(points, &lattice, &frame, options, progress, lap)?;
     let mut report = describe(cloud, &lattice, &answer.found, laps);
     report.cells = answer.cubes;
     report.nodes = answer.surfaces;

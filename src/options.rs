@@ -65,8 +65,9 @@ pub enum Orient {
     None,
     /// One sign for each connected surface: outwards if it is closed, else towards what stands before it; if nothing does, away
     /// from its middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal. For anything; [`crate::Report::components`]
-    /// tells how sure it is. In noise also the lines of normals change with [`Method::Bilinear`] and [`Cell::Auto`], where surfaces
-    /// face apart within it: there a mean of normals with their signs is right more often.
+    /// tells how sure it is. With [`Method::Bilinear`] and [`Cell::Auto`] also the lines of some normals change, because no sign of
+    /// them would be right: in noise, where surfaces face apart within it, to a mean of normals with their signs; and without any
+    /// noise, where a face is too narrow for a surface, to that of the plane that the points lie on.
     Consistent,
     /// The same for surfaces that are closed. Of others every part is turned to what it sees of the open, even if that makes an
     /// edge of its own, and to nothing that stands before it: for heaps of parts, and objects with holes.
@@ -84,6 +85,11 @@ impl Orient {
             Self::None | Self::Up(_) => false,
             Self::Consistent | Self::Outward | Self::Viewpoint(_) => true,
         }
+    }
+
+    /// Whether each surface gets one sign.
+    pub(crate) fn is_of_surfaces(self) -> bool {
+        matches!(self, Self::Consistent | Self::Outward)
     }
 }
 
@@ -117,7 +123,7 @@ impl Options {
             let [x, y, z] = [x, y, z].map(text);
             Err(Error::Input(message!["orient.", name, " is ", x, ", ", y, ", ", z, "; wanted ", wanted]))
         };
-        if self.components && !matches!(self.orient, Orient::Consistent | Orient::Outward) {
+        if self.components && !self.orient.is_of_surfaces() {
             return Err(Error::Input(
                 "components are those of orient 'consistent' or 'outward'; wanted one of them".into(),
             ));

@@ -93,6 +93,18 @@ impl Around {
         &self.list[..count]
     }
 
+    /// The least value of the occupied cubes in and at most two deep round brick `brick`.
+    pub fn least(&mut self, grid: &Grid, brick: usize, value: impl Fn(u32) -> f32) -> f32 {
+        if self.brick != brick {
+            self.look(grid, brick);
+        }
+        let mut least = f32::INFINITY;
+        for (word, cubes) in self.occupied.iter().zip(self.cubes.chunks(64)) {
+            set_bits(*word).for_each(|bit| least = least.min(value(cubes[bit as usize])));
+        }
+        least
+    }
+
     fn place(bit: u32) -> usize {
         (146 + (bit & 3) + 8 * (bit >> 2 & 3) + 64 * (bit >> 4)) as usize
     }

@@ -12,7 +12,7 @@ use super::matrix::{Matrix, dot_lanes};
 use super::surface::plane_of;
 use crate::grid::located;
 use crate::lanes::{power, transposed};
-use crate::lattice::{BRICK, cube_centre};
+use crate::lattice::cube_centre;
 use crate::normals::SHORT;
 use crate::pca::Symmetric;
 use glam::{Vec3, Vec4};
@@ -115,25 +115,19 @@ impl Faces {
         if sum == 0.0 || !self.choose(near, chosen) {
             return false;
         }
-        let (centre, side) = (cube_centre(bit), BRICK as f32);
         let count: usize = near.iter().map(|near| level.points(near.cube as usize).len()).sum();
         let stride = 1 + count / MANY;
-        let mut own = &[][..];
         self.places.clear();
-        for near in near {
-            // From the corner of that cube's brick to the centre of the own cube.
-            let shift = ((centre + near.step) / side).floor() * side - centre;
-            let points = level.points(near.cube as usize);
+        for (shift, points) in level.points_near(bit, near) {
             self.places.extend(points.iter().step_by(stride).map(|p| (p.local + shift).extend(1.0)));
-            if near.step == Vec3::ZERO {
-                own = points;
-            }
         }
+        let own =
+            near.iter().find(|near| near.step == Vec3::ZERO).map_or(&[][..], |own| level.points(own.cube as usize));
         let stride = 1 + self.places.len() / SOME;
         [stride, stride, 1].into_iter().all(|stride| self.fit(stride) && self.end())
             && self.noise <= FIT * expected
             && own.chunks(4).all(|four| {
-                let likelihoods = self.likelihoods(located(four, centre).0);
+                let likelihoods = self.likelihoods(located(four, cube_centre(bit)).0);
                 likelihoods.into_iter().sum::<Vec4>().cmpgt(Vec4::splat(FOREIGN)).all()
             })
     }

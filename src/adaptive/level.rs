@@ -207,6 +207,17 @@ impl Level {
         &self.grid.placed[range(&self.grid.cube_end, cube)]
     }
 
+    /// The points of some cubes near the one with bit `bit` of a brick, cube by cube, each with what makes their places those
+    /// against its centre.
+    pub fn points_near<'a>(&'a self, bit: u32, near: &'a [Near]) -> impl Iterator<Item = (Vec3, &'a [Placed])> {
+        let (centre, side) = (cube_centre(bit), BRICK as f32);
+        near.iter().map(move |near| {
+            // From the corner of that cube's brick to the centre of the own cube.
+            let shift = ((centre + near.step) / side).floor() * side - centre;
+            (shift, self.points(near.cube as usize))
+        })
+    }
+
     /// The centroid of the points of a cube, against its centre.
     pub fn centroid(&self, cube: usize, bit: u32) -> Vec3 {
         let centre = cube_centre(bit);

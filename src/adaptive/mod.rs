@@ -8,6 +8,7 @@
 mod around;
 mod choose;
 mod faces;
+mod facets;
 mod level;
 mod matrix;
 mod samples;
@@ -20,6 +21,7 @@ use crate::frame::Frame;
 use crate::lattice::{self, Lattice};
 use crate::lists::grow;
 use crate::normals::{Found, Normals};
+use crate::options::Options;
 use crate::points::Points;
 use crate::progress::{Progress, Stage};
 use crate::source::Source;
@@ -67,7 +69,7 @@ pub(crate) fn normals(
     points: Points,
     lattice: &Lattice,
     frame: &Frame,
-    curvature: bool,
+    options: &Options,
     progress: &Progress,
     lap: &mut dyn FnMut(&'static str),
 ) -> Result<Adaptive, Error> {
@@ -75,7 +77,7 @@ pub(crate) fn normals(
     let count = points.len();
     drop(points);
     // At once: they fit into the memory that the positions had, unless something smaller takes a part of it first.
-    let normals = Normals::new(count, base.grid.placed.len(), curvature, frame)?;
+    let normals = Normals::new(count, base.grid.placed.len(), options.curvature, frame)?;
     base.sample(None, &progress.stage("sort", 0.28..0.3))?;
     lap("sort");
     let mut levels = vec![base];
@@ -101,7 +103,8 @@ pub(crate) fn normals(
     let stage = progress.stage("vote", 0.5..0.6);
     let chosen = choose(&levels, &stage.part(0.0..0.4))?;
     let tally = Tally::new();
-    let mut run = Run { batch: BATCH.max(count / 8), normals: &normals, tally: &tally, cubes: 0, surfaces: 0 };
+    let facets = cfg!(feature = "full") && options.orient.is_of_surfaces();
+    let mut run = Run { batch: BATCH.max(count / 8), facets, normals: &normals, tally: &tally, cubes: 0, surfaces: 0 };
     let parts = run.settle(&levels, &chosen, 0, &stage.part(0.4..1.0))?;
     drop(chosen);
     lap("vote");
@@ -118,6 +121,8 @@ pub(crate) fn normals(
 struct Run<'a> {
     /// About how many points are divided at a time.
     batch: usize,
+    /// Whether narrow faces are told by points.
+    facets: bool,
     normals: &'a Normals,
     tally: &'a Tally,
     cubes: u64,
@@ -136,7 +141,7 @@ impl Run<'_> {
         stage: &Stage,
     ) -> Result<Vec<Role>, Error> {
         let level = &levels[levels.len() - 1];
-        let vote = Vote { level, chosen, division, normals: self.normals, tally: self.tally };
+        let vote = Vote { level, chosen, division, facets: self.facets, normals: self.normals, tally: self.tally };
         let parts = vote.run(stage)?;
         let is_done = |cube: usize| level.role(cube) == Role::Wanted && parts[cube] != Role::Wanted;
         for (_, chosen) in chosen.iter().enumerate().filter(|&(cube, _)| is_done(cube)) {

@@ -3,6 +3,7 @@
 use super::around::{Around, Near};
 use super::choose::Chosen;
 use super::faces::Faces;
+use super::facets;
 use super::level::{Level, Role};
 use super::matrix::{dot_lanes, times_lanes};
 use super::tally::Tally;
@@ -62,12 +63,20 @@ const UNSURE: f32 = 0.07;
 /// A cube is in noise where one in so many cubes near it is a plane in noise.
 const IN_NOISE: usize = 10;
 
+/// Faces are told by points where a surface has more noise than this, in edges and squared: it may lie across an edge,
+const TORN: f32 = 0.0064;
+
+/// and where the cloud has no noise: near by lies a surface with less.
+const CLEAN: f32 = 1e-5;
+
 /// The cubes of a level, and the surfaces they rest on.
 pub(super) struct Vote<'a> {
     pub level: &'a Level,
     pub chosen: &'a [Chosen],
     /// How often the cubes were divided.
     pub division: usize,
+    /// Whether narrow faces are told by points.
+    pub facets: bool,
     pub normals: &'a Normals,
     pub tally: &'a Tally,
 }
@@ -103,13 +112,38 @@ struct Task<'a> {
     around: Around,
     ballot: Ballot,
     faces: Faces,
+    /// A brick, and the least noise of a surface in and two cubes round it.
+    cleanest: (usize, f32),
     resolved: u64,
 }
 
 impl<'a> Task<'a> {
     fn new(vote: &'a Vote<'a>) -> Self {
         let writer = vote.normals.writer();
-        Self { vote, writer, around: Around::new(), ballot: Ballot::default(), faces: Faces::default(), resolved: 0 }
+        Self {
+            vote,
+            writer,
+            around: Around::new(),
+            ballot: Ballot::default(),
+            faces: Faces::default(),
+            cleanest: (usize::MAX, 0.0),
+            resolved: 0,
+        }
+    }
+
+    /// Whether the surface of a cube may lie across an edge of faces that points tell better.
+    #[optimize(size)]
+    #[inline(never)]
+    fn is_torn(&mut self, brick: usize, cube: usize) -> bool {
+        let Vote { level, chosen, .. } = *self.vote;
+        if chosen[cube].noise <= TORN {
+            return false;
+        }
+        if self.cleanest.0 != brick {
+            let noise = |cube: u32| chosen[cube as usize].flat_noise;
+            self.cleanest = (brick, self.around.least(&level.grid, brick, noise));
+        }
+        self.cleanest.1 < CLEAN
     }
 
     /// Finds the normals of the points of a cube, unless it is to be divided: answers what its parts would be for, and only
@@ -152,7 +186,8 @@ impl<'a> Task<'a> {
         }
         let placed = level.points(cube);
         let centre = cube_centre(bit);
-        if is_edge || smooth.is_some() {
+        let is_torn = cfg!(feature = "full") && self.vote.facets && !is_edge && self.is_torn(brick, cube);
+        if is_edge || smooth.is_some() && !is_torn {
             for four in placed.chunks(4) {
                 let (places, points) = located(four, centre);
                 let directions = match &smooth {
@@ -163,9 +198,16 @@ impl<'a> Task<'a> {
                 unsafe { self.writer.write_lanes(points, four.len(), directions) };
             }
         } else {
+            let near = if is_torn { self.around.near(&level.grid, brick, bit, 1) } else { &[] };
             for p in placed {
+                let place = p.local - centre;
+                let facet = if is_torn { facets::normal(level, bit, near, place) } else { None };
+                let direction = facet.unwrap_or_else(|| match &smooth {
+                    Some(smooth) => smooth.direction(place),
+                    None => self.ballot.vote(place),
+                });
                 // SAFETY: as above.
-                unsafe { self.writer.write(p.point, self.ballot.vote(p.local - centre)) };
+                unsafe { self.writer.write(p.point, direction) };
             }
         }
         if self.writer.has_curvature() {
@@ -226,6 +268,11 @@ impl Smooth {
         let centre = self.centre;
         let turns = times_lanes(self.turn, [x - centre.x, y - centre.y, z - centre.z]);
         std::array::from_fn(|axis| self.normal[axis] + turns[axis])
+    }
+
+    /// That of one point.
+    fn direction(&self, point: Vec3) -> Vec3 {
+        Vec3::from_array(self.directions(point.to_array().map(Vec4::splat)).map(|lanes| lanes.x))
     }
 }
 

@@ -47,7 +47,8 @@ export interface EstimateOptions {
    * each connected surface, outwards if it is closed, else towards what stands before it; if nothing does, away from its
    * middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal. `'outward'`: the same for closed surfaces; of others
    * every part is turned to what it sees of the open, for heaps of parts and objects with holes. Both also average normals,
-   * with `cell: 'auto'`, where surfaces face apart within the noise, as at edges and on rods: elsewhere only signs change.
+   * with `cell: 'auto'`, where surfaces face apart within the noise, as at edges and on rods, and give the narrow sides of
+   * ribs and grooves without noise the planes that their points lie on: elsewhere only signs change.
    * `viewpoint`: towards a position, in the coordinates of `positions`. `up`: towards a direction of any length but 0, for
    * terrain. Both are arrays of three finite numbers.
    */

@@ -105,10 +105,10 @@ describe('the small run', () => {
     assert.ok(known.thick > 0.999 && unknown.thick < 0.001, `${known.thick}, ${unknown.thick}`);
   });
 
-  test('tells how far lines are off, and that only noise lets signs change them', () => {
+  test('tells how far lines are off, and that without noise signs change them for the better only', () => {
     for (const { variant, lines } of rows) {
       assert.deepEqual(Object.keys(lines), ['none', ...MODES]);
-      if (variant === 'clean') assert.equal(lines.consistent, lines.none);
+      if (variant === 'clean') assert.ok(lines.consistent <= lines.none, `${lines.consistent} for ${lines.none}`);
     }
     const { none, consistent } = find('box', 'noise0.6').lines;
     assert.ok(consistent !== none && Math.abs(consistent - none) < 0.1 * none, `${consistent} degrees for ${none}`);
