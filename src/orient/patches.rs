@@ -89,8 +89,11 @@ impl Membership {
 /// Patches of a cube at the most: more are a tangle, and its points join whichever is nearest.
 pub(super) const MOST: usize = 16;
 
-/// The normals of a patch lie within 32 degrees of their mean: its cosine, squared.
-const COSINE_SQUARED: f32 = 0.72;
+/// The normals of a patch lie within 16 degrees of their mean: its cosine, squared. So the sides of a blade are two. With noise of
+/// so many edges and more it is 32 degrees, because noise must not tear a surface apart.
+const COSINE_SQUARED: f32 = 0.92;
+const COSINE_SQUARED_IN_NOISE: f32 = 0.72;
+const NOISE: f32 = 0.1;
 
 /// How far from the plane of a patch a point may lie to join it, in edges: little, because thin walls have both sides in one
 /// cube; but noise must not tear a surface into layers, so no less than so many times the noise.
@@ -108,11 +111,13 @@ const UNLIKE: f32 = 0.1;
 /// Patches of so many points are certain.
 const CERTAIN: u32 = 8;
 
-/// How far the points of a patch may lie off its plane, in edges.
+/// How far the points of a patch may lie off its plane, in edges, and their normals off its own.
 #[derive(Clone, Copy)]
 struct Limits {
     /// To be one of them.
     thickness: f32,
+    /// And its normal off theirs: the square of a cosine.
+    cosine_squared: f32,
     /// The variance at which the patch is half as flat.
     uneven: f32,
 }
@@ -121,7 +126,8 @@ impl Limits {
     /// Where points lie so far off their surface.
     fn of(noise: f32) -> Self {
         let uneven = UNEVEN.max(UNEVEN_DEVIATIONS * noise);
-        Self { thickness: THICKNESS.max(DEVIATIONS * noise), uneven: uneven * uneven }
+        let cosine_squared = COSINE_SQUARED + (noise / NOISE).min(1.0) * (COSINE_SQUARED_IN_NOISE - COSINE_SQUARED);
+        Self { thickness: THICKNESS.max(DEVIATIONS * noise), cosine_squared, uneven: uneven * uneven }
     }
 
     /// The flatness of so many points, with the sum of their square distances from the plane.
@@ -211,7 +217,7 @@ fn split(
         let i = *i as usize;
         let (place, normal) = (points[i].local - centre, normals[i]);
         let own = &patches[first..];
-        let misfit = |patch: &Patch| misfit(patch, place, normal, limits.thickness);
+        let misfit = |patch: &Patch| misfit(patch, place, normal, limits);
         let fits = own.iter().enumerate().filter_map(|(number, patch)| Some((number, misfit(patch)?)));
         let mut best = fits.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(number, _)| number);
         if best.is_none() && own.len() == MOST {
@@ -258,7 +264,7 @@ fn whole(points: &[Placed], normals: &[Vec3], centre: Vec3, limits: Limits) -> O
     let mut squares = 0.0;
     for (point, &own) in points.iter().zip(normals) {
         let (along, off) = (normal.dot(own), (point.local - place).dot(normal));
-        if along * along < COSINE_SQUARED || off.abs() >= limits.thickness {
+        if along * along < limits.cosine_squared || off.abs() >= limits.thickness {
             return None;
         }
         squares += off * off;
@@ -293,13 +299,13 @@ fn key(place: Vec3) -> u64 {
 
 /// How badly a point fits a patch of sums; `None` if it is none of its.
 #[inline(always)]
-fn misfit(patch: &Patch, place: Vec3, normal: Vec3, thickness: f32) -> Option<f32> {
+fn misfit(patch: &Patch, place: Vec3, normal: Vec3, limits: Limits) -> Option<f32> {
     let (square, along) = (patch.normal.length_squared(), patch.normal.dot(normal).abs());
-    if along * along < COSINE_SQUARED * square {
+    if along * along < limits.cosine_squared * square {
         return None;
     }
     let apart = place - patch.centre / patch.points as f32;
     let length = square.sqrt();
     let off = (apart.dot(patch.normal).abs() / length).min(apart.dot(normal).abs());
-    (off < thickness).then(|| 1.0 - along / length + off)
+    (off < limits.thickness).then(|| 1.0 - along / length + off)
 }
