@@ -3,7 +3,8 @@
 //! `docs/adaptive.md` explains the rule, its sources and its limits. In short: a quadratic surface through the 27 cubes
 //! round each cube, on grids of ever larger cubes ([`level`], [`surface`]); for each cube the size that is least in error
 //! ([`choose`]); where the surfaces round a cube then agree they give the normals of its points, where not the cube is
-//! divided, and where that is of no use or not possible the points vote ([`vote`]).
+//! divided, and where that is of no use or not possible the points vote ([`vote`]). With signs for surfaces, points of narrow faces
+//! without noise lie on planes of their own ([`facets`]).
 
 mod around;
 mod choose;
@@ -103,7 +104,7 @@ pub(crate) fn normals(
     let stage = progress.stage("vote", 0.5..0.6);
     let chosen = choose(&levels, &stage.part(0.0..0.4))?;
     let tally = Tally::new();
-    let facets = cfg!(feature = "full") && options.orient.is_of_surfaces();
+    let facets = options.orient.is_of_surfaces();
     let mut run = Run { batch: BATCH.max(count / 8), facets, normals: &normals, tally: &tally, cubes: 0, surfaces: 0 };
     let parts = run.settle(&levels, &chosen, 0, &stage.part(0.4..1.0))?;
     drop(chosen);
@@ -121,7 +122,7 @@ pub(crate) fn normals(
 struct Run<'a> {
     /// About how many points are divided at a time.
     batch: usize,
-    /// Whether narrow faces are told by points.
+    /// Whether narrow faces are told by points: where signs are, lines matter most.
     facets: bool,
     normals: &'a Normals,
     tally: &'a Tally,

@@ -186,6 +186,7 @@ impl<'a> Task<'a> {
         }
         let placed = level.points(cube);
         let centre = cube_centre(bit);
+        // Without signs they are never asked for, and left out of the module then.
         let is_torn = cfg!(feature = "full") && self.vote.facets && !is_edge && self.is_torn(brick, cube);
         if is_edge || smooth.is_some() && !is_torn {
             for four in placed.chunks(4) {
