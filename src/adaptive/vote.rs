@@ -199,10 +199,10 @@ impl<'a> Task<'a> {
                 unsafe { self.writer.write_lanes(points, four.len(), directions) };
             }
         } else {
-            let near = if is_torn { self.around.near(&level.grid, brick, bit, 1) } else { &[] };
+            let near = is_torn.then(|| self.around.near(&level.grid, brick, bit, 1));
             for p in placed {
                 let place = p.local - centre;
-                let facet = if is_torn { facets::normal(level, bit, near, place) } else { None };
+                let facet = near.and_then(|near| facets::normal(level, bit, near, place));
                 let direction = facet.unwrap_or_else(|| match &smooth {
                     Some(smooth) => smooth.direction(place),
                     None => self.ballot.vote(place),
