@@ -118,8 +118,8 @@ fn every_cloud_ends_in_unit_or_zero_vectors() {
     }
 }
 
-/// Signs change signs only, whatever the cloud, unless they let `'auto'` average normals in noise; progress rises from 0 to 1,
-/// and every point is in one component or in none.
+/// Signs change signs only, whatever the cloud, unless with `'auto'` they let normals be averaged in noise and narrow faces have
+/// their own; progress rises from 0 to 1, and every point is in one component or in none.
 #[test]
 fn every_cloud_can_be_oriented() {
     use std::cell::Cell as Heard;

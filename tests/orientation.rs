@@ -681,8 +681,8 @@ fn only_signs_change() {
     }
 }
 
-/// A comb whose ribs and gaps are three to four spacings wide: no neighbourhood lies on one of their sides, but without noise the
-/// points themselves tell these. Any noise is too much for that.
+/// A comb whose ribs are three to four spacings thick: no neighbourhood lies on their narrow sides alone, but without noise the
+/// points themselves tell these. A twentieth of a spacing is too much noise for that.
 #[test]
 fn narrow_faces_have_their_own_normals() {
     let mut polygon = vec![[-1.0, -1.0], [1.0, -1.0]];
