@@ -434,7 +434,7 @@ fn an_open_surface_faces_what_stands_before_it() {
         let result = orient(&cloud.points, Orient::Consistent);
         let right = share_right(&result.normals, &cloud.normals);
         assert!(right > 0.999, "{name}: {right}, {:?}", components(&result));
-        assert_eq!(components(&result)[0].side, Side::Sight, "{name}");
+        assert_eq!(components(&result)[0].side, if sees_all { Side::Sight } else { Side::View }, "{name}");
         // So it does in a mirror.
         let flip = |points: &[f32]| points.chunks_exact(3).flat_map(|p| [-p[0], p[1], p[2]]).collect::<Vec<f32>>();
         let truth: Vec<[f64; 3]> = cloud.normals.iter().map(|n| [-n[0], n[1], n[2]]).collect();
@@ -474,6 +474,89 @@ fn what_is_hollow_does_not_face_itself() {
     }
 }
 
+/// Balls, `(middle, radius)`, or their insides, as a scanner at (0, 0, `distance`) sees them, which looks down so far to each
+/// side as `spread` at a distance of 1: as many points in every direction.
+fn view_of(balls: &[([f64; 3], f64)], from_inside: bool, distance: f64, spread: f64, count: usize) -> Cloud {
+    let mut random = Random(71);
+    let mut ray = move || unit([spread * random.signed(), spread * random.signed(), -1.0]);
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let first = |along: [f64; 3]| {
+        let hits = balls.iter().filter_map(|&(middle, radius)| {
+            let to = [middle[0], middle[1], middle[2] - distance];
+            let (closest, squared) = (dot(to, along), dot(to, to) - radius * radius);
+            let half = (closest * closest - squared).max(0.0).sqrt();
+            let depth = if from_inside { closest + half } else { closest - half };
+            let side = if from_inside { -1.0 } else { 1.0 };
+            let normal = [0, 1, 2].map(|axis| side * (depth * along[axis] - to[axis]) / radius);
+            (half > 0.0).then_some((depth, normal))
+        });
+        let (depth, normal) = hits.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(([depth * along[0], depth * along[1], distance + depth * along[2]], normal))
+    };
+    Cloud::of(std::iter::repeat_with(|| first(ray())).flatten().take(count).map(|(p, n)| (turn(p), turn(n))))
+}
+
+/// What is behind is parted from the rest by the shadow of the ball before it, past whose edge it looks; by itself it would
+/// turn that.
+#[test]
+fn what_was_seen_from_one_side_faces_it() {
+    let balls = [([0.0, 0.0, 0.0], 1.0), ([1.0, 0.3, -1.3], 0.5), ([-0.9, 0.7, -1.0], 0.45), ([0.1, -1.2, -0.6], 0.4)];
+    for noise in [0.0, 0.0012] {
+        let cloud = view_of(&balls, false, 5.0, 0.44, 80_000).noisy(noise, 3);
+        for mirrored in [false, true] {
+            let flip = |[x, y, z]: [f64; 3]| [if mirrored { -x } else { x }, y, z];
+            let points = cloud.points.chunks_exact(3).flat_map(|p| [if mirrored { -p[0] } else { p[0] }, p[1], p[2]]);
+            let truth: Vec<[f64; 3]> = cloud.normals.iter().copied().map(flip).collect();
+            let result = orient(&points.collect::<Vec<f32>>(), Orient::Consistent);
+            let right = share_right(&result.normals, &truth);
+            assert!(right > 0.9999, "{noise}: {right}, {:?}", components(&result));
+            assert!(components(&result).len() > 1, "the shadow does not part them");
+            let is_told = |one: &Component| one.side == Side::View && one.confidence > 0.3;
+            assert!(components(&result).iter().all(is_told), "{:?}", components(&result));
+        }
+    }
+}
+
+/// A wave is the same from behind. Only that what is farther from the scanner has fewer points tells which side was seen.
+#[test]
+fn what_is_nearer_to_a_scanner_is_denser() {
+    for height in [2.5, -2.5] {
+        let mut random = Random(72);
+        let sample = move || {
+            let (x, y) = (random.signed(), random.signed());
+            let point = [x, y, 0.3 * (3.0 * x).sin()];
+            let slope = 0.9 * (3.0 * x).cos();
+            let to = [-x, -y, height - point[2]];
+            // The share of the scanner's directions that a piece of the wave takes, over each of the plane.
+            let along = to[2] - slope * to[0];
+            let distance = to.iter().map(|c| c * c).sum::<f64>().sqrt();
+            let normal = unit([-slope * along.signum(), 0.0, along.signum()]);
+            (random.unit() < 4.0 * along.abs() / distance.powi(3)).then(|| (turn(point), turn(normal)))
+        };
+        let cloud = Cloud::of(std::iter::repeat_with(sample).flatten().take(60_000));
+        let result = orient(&cloud.points, Orient::Consistent);
+        let right = share_right(&result.normals, &cloud.normals);
+        assert_eq!(right, 1.0, "{height}: {:?}", components(&result));
+        assert_eq!(components(&result)[0].side, Side::View);
+    }
+}
+
+/// Two planes, one behind the other, whatever direction they are seen from: no scanner saw both.
+#[test]
+fn what_hides_is_no_view() {
+    for apart in [0.03, 0.1, 0.2] {
+        let mut random = Random(74);
+        let cloud = Cloud::of((0..60_000).map(|_| {
+            let side = if random.unit() < 0.5 { 1.0 } else { -1.0 };
+            let point = [random.signed(), random.signed(), side * apart / 2.0];
+            (turn(point), turn([0.0, 0.0, side]))
+        }));
+        let result = orient(&cloud.points, Orient::Consistent);
+        let right = share_right(&result.normals, &cloud.normals);
+        assert_eq!(right.max(1.0 - right), 1.0, "{apart}: {:?}", components(&result));
+    }
+}
+
 /// What stands on it is one surface with it, and neither its volume nor the convention says which side is up.
 #[test]
 fn ground_faces_what_stands_on_it() {
@@ -501,7 +584,7 @@ fn ground_faces_what_stands_on_it() {
         let result = orient(&cloud.points, Orient::Consistent);
         let right = share_right(&result.normals, &cloud.normals);
         assert!(right > 0.999, "{height}: {right}, {:?}", components(&result)[0]);
-        assert_eq!(components(&result)[0].side, Side::Sight, "{height}");
+        assert!(matches!(components(&result)[0].side, Side::Sight | Side::View), "{height}");
     }
 }
 

@@ -44,14 +44,16 @@ const ASKED = {
   'meshes with noise 0.6 %, thin': { part: 'thin', least: 0.97 },
   'meshes, other noise and density': { least: 0.97 },
   'range scans': { least: 0.999 },
-  // By 'outward' rooms face away from the scanner.
+  // By 'outward' rooms and hollows face away from the scanner.
   scenes: { modes: ['consistent'], least: 0.995 },
+  'single views': { modes: ['consistent'], least: 0.995 },
 };
 
 function kindsOf({ kind, variant, sides }) {
   if (!sides) return [];
   if (kind === 'ranges') return ['range scans'];
   if (kind === 'scene') return ['scenes'];
+  if (kind === 'view') return ['single views'];
   if (kind === 'shape') return [variant === 'clean' ? 'clean shapes' : 'noisy shapes'];
   if (variant === 'clean') return ['clean meshes'];
   if (variant === 'noise0.6') return ['meshes with noise 0.6 %, thick', 'meshes with noise 0.6 %, thin'];

@@ -5,6 +5,7 @@ import { angles, summary } from '../accuracy/judge.mjs';
 import { likeliest } from './attainable.mjs';
 import { rightSigns, verdicts } from './judge.mjs';
 import { SHAPES, turned } from './shapes.mjs';
+import { VIEWS, seenFrom } from './single.mjs';
 import { cornersOf, hidden, signedVolume, thickness } from './solid.mjs';
 
 export const MODES = ['consistent', 'outward'];
@@ -35,6 +36,7 @@ export const FULL = {
   large: 1_000_000,
   surface: 300_000,
   meshVariants: Object.keys(VARIANTS),
+  viewVariants: ['clean', 'noise0.12'],
 };
 /** For tests: seconds. */
 export const SMALL = {
@@ -43,6 +45,7 @@ export const SMALL = {
   large: 30_000,
   surface: 30_000,
   meshVariants: ['clean', 'noise0.6'],
+  viewVariants: ['clean'],
 };
 
 /**
@@ -76,7 +79,7 @@ export function withOutside(read) {
  * surface and of its noise, and noisy meshes `walls`, which answers how thick the wall behind each point is, in deviations of the
  * noise. `scans`: `{ name, about, positions, normals }`.
  */
-export function plannedRows({ rows, points, large, surface, meshVariants }, meshes, scans = []) {
+export function plannedRows({ rows, points, large, surface, meshVariants, viewVariants }, meshes, scans = []) {
   const shapes = Object.keys(SHAPES);
   const clouds = (samplerFor, variant, seed) => {
     const { noise = 0, keep } = VARIANTS[variant];
@@ -109,6 +112,19 @@ export function plannedRows({ rows, points, large, surface, meshVariants }, mesh
         walls: VARIANTS[variant].noise && (() => walls().map((wall) => wall / VARIANTS[variant].noise)),
       }));
     }),
+    ...meshes.flatMap(({ name, corners, sampler }) =>
+      Object.entries(VIEWS).flatMap(([view, direction]) => {
+        const seen = once(() => seenFrom(direction, corners, sampler));
+        return viewVariants.map((variant) => ({
+          name: `${name} ${view}`,
+          variant,
+          kind: 'view',
+          open: false,
+          sides: true,
+          cloud: () => cloudOf(seen(), points, VARIANTS[variant], MESH_SEED),
+        }));
+      }),
+    ),
     ...scans.map(({ name, about, ...cloud }) => ({
       name,
       about,

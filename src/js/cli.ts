@@ -318,6 +318,7 @@ function surfaces({ count, largest }: Report['components'] = { count: 0, largest
     air: 'outwards',
     volume: 'away from the middle',
     sight: 'towards what stands before them',
+    view: 'towards the scanner',
     convention: 'to a side by convention',
   };
   const shown = largest.slice(0, 4).map(({ points, side, confidence }) => {

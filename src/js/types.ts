@@ -45,8 +45,9 @@ export interface EstimateOptions {
   /**
    * How signs are chosen. Default `'none'`: `x + 2y + 4z >= 0`, deterministic and nothing more. `'consistent'`: one sign for
    * each connected surface, outwards if it is closed, else towards what stands before it; if nothing does, away from its
-   * middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal. `'outward'`: the same for closed surfaces; of others
-   * every part is turned to what it sees of the open, for heaps of parts and objects with holes. Both also average normals,
+   * middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal; what one scanner saw from one side faces it. `'outward'`:
+   * the same for closed surfaces; of others every part is turned to what it sees of the open, for heaps of parts and objects
+   * with holes. Both also average normals,
    * with `cell: 'auto'`, where surfaces face apart within the noise, as at edges and on rods, and give the narrow sides of
    * ribs and grooves without noise the planes that their points lie on: elsewhere only signs change.
    * `viewpoint`: towards a position, in the coordinates of `positions`. `up`: towards a direction of any length but 0, for
@@ -124,15 +125,16 @@ export interface Report {
    * The surfaces that were given one sign each: how many there are, and at most the thousand largest, the largest first.
    * `side` tells by what: `'air'`, because the surface is closed, and one side sees much more of the open air; `'volume'`, away
    * from the middle of what is open or hidden, or, of what is long and thin, from the middles of its pieces; `'sight'`, because
-   * other surfaces, or its own parts, stand before that side (by `'consistent'` only); `'convention'`, because it is open and
-   * flat, so that nothing tells: the mean normal has `x + 2y + 4z >= 0`. `confidence`, from 0, a guess, to 1, which is sure: of
-   * all that is seen of the open, how much more is seen from one side; for what sees nothing of it how much volume there is, of
-   * that of a sphere, or of its pieces; by sight, half of how much more looks at that side, of all that does. Only with
-   * `orient: 'consistent'` and `'outward'`.
+   * other surfaces, or its own parts, stand before that side; `'view'`, because the cloud is what a scanner saw from that side
+   * (both by `'consistent'` only); `'convention'`, because it is open and flat, so that nothing tells: the mean normal has
+   * `x + 2y + 4z >= 0`. `confidence`, from 0, a guess, to 1, which is sure: of all that is seen of the open, how much more is
+   * seen from one side; for what sees nothing of it how much volume there is, of that of a sphere, or of its pieces; by sight,
+   * half of how much more looks at that side, of all that does; by view, up to a half. Only with `orient: 'consistent'` and
+   * `'outward'`.
    */
   components?: {
     count: number;
-    largest: { points: number; side: 'air' | 'volume' | 'sight' | 'convention'; confidence: number }[];
+    largest: { points: number; side: 'air' | 'volume' | 'sight' | 'view' | 'convention'; confidence: number }[];
   };
   /**
    * Each phase in the wasm module, and `total`: from the moment the call left the queue to its result in the calling

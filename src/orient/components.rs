@@ -5,7 +5,7 @@ use super::patches::{Patches, signed};
 use super::signs::{CLOSED, Signs};
 use crate::error::Error;
 use crate::grid::Grid;
-use crate::lattice::{BRICK, cube_centre};
+use crate::lattice::BRICK;
 use crate::lists::{filled, grow, reserve};
 use glam::DVec3;
 use std::cmp::Reverse;
@@ -38,7 +38,7 @@ pub struct Component {
     pub side: Side,
     /// How much more speaks for that side than for the other: 0 is a guess, 1 is sure. By the air of all that is seen of the
     /// open how much more is seen from one side; for what sees nothing of it how much volume there is, of that of a sphere, or
-    /// of its pieces; by sight, half of how much more looks at one side, of all that does.
+    /// of its pieces; by sight, half of how much more looks at one side, of all that does; by view, up to a half.
     pub confidence: f64,
 }
 
@@ -52,6 +52,8 @@ pub enum Side {
     Volume,
     /// What stands before it: it is looked at from one side.
     Sight,
+    /// The scanner: all of the cloud was seen from one side.
+    View,
     /// Nothing: the surface is open and flat. By convention `x + 2y + 4z >= 0` for its mean normal.
     Convention,
 }
@@ -63,6 +65,7 @@ impl Side {
             Self::Air => "air",
             Self::Volume => "volume",
             Self::Sight => "sight",
+            Self::View => "view",
             Self::Convention => "convention",
         }
     }
@@ -72,7 +75,7 @@ impl Side {
 pub(super) struct Decision {
     pub component: Component,
     pub patches: u64,
-    /// How much volume it holds, on either side, of that of a sphere, or of its pieces; 0 if it is flat.
+    /// How much volume it holds behind it, of that of a sphere, or of its pieces, less than 0 if before it; 0 if it is flat.
     pub volume: f64,
 }
 
@@ -96,8 +99,10 @@ const LEAST_BULGE: f64 = 0.12;
 /// The mean of normals that look all round is shorter.
 const ALL_ROUND: f64 = 0.5;
 
-/// The convention: normals along it are positive.
-const POSITIVE: DVec3 = DVec3::new(1.0, 2.0, 4.0);
+/// The convention, where nothing tells the side of a mean normal: whether it is to be turned.
+pub(super) fn is_below(normal: DVec3) -> bool {
+    normal.dot(DVec3::new(1.0, 2.0, 4.0)) < 0.0
+}
 
 /// Sums over a component, with its normals as they were signed.
 #[derive(Clone, Copy, Default)]
@@ -162,19 +167,16 @@ impl Sums {
             volume = if is_all_round && bulge.abs() >= LEAST_BULGE { bulge } else { 0.0 };
         }
         let is_seen = self.sight >= LEAST_SIGHT * self.patches as f64;
-        let told = |side, confidence: f64| Decision {
-            component: Component { points: self.points, side, confidence: confidence.abs().min(1.0) },
-            patches: self.patches,
-            volume: volume.abs(),
-        };
-        if is_seen && air.abs() > CLOSED {
-            (told(Side::Air, air), air < 0.0)
+        let (side, confidence, is_inwards) = if is_seen && air.abs() > CLOSED {
+            (Side::Air, air, air < 0.0)
         } else if volume.abs() >= LEAST_VOLUME {
             // What is open to both sides has no outside to be sure of; terrain even sees more of the open from below.
-            (told(Side::Volume, if is_seen { air } else { volume }), volume < 0.0)
+            (Side::Volume, if is_seen { air } else { volume }, volume < 0.0)
         } else {
-            (told(Side::Convention, 0.0), self.normal.dot(POSITIVE) < 0.0)
-        }
+            (Side::Convention, 0.0, is_below(self.normal))
+        };
+        let component = Component { points: self.points, side, confidence: confidence.abs().min(1.0) };
+        (Decision { component, patches: self.patches, volume: signed(is_inwards, volume) }, is_inwards)
     }
 }
 
@@ -200,16 +202,10 @@ pub(super) fn decide(
 ) -> Result<Vec<Decision>, Error> {
     let mut all = filled(Sums::default(), signs.components, WHAT)?;
     let corner = |brick: usize| f64::from(BRICK) * grid.bricks.places[brick].as_dvec3();
-    // The patches, their bricks, and where they are in those.
-    let places = || {
-        (0..grid.blocks.len()).flat_map(|block| grid.cubes_in(block)).flat_map(|(brick, cube, bit)| {
-            let centre = cube_centre(bit);
-            patches.of_cube(cube).map(move |i| (i, brick, (centre + patches.all[i].centre).as_dvec3()))
-        })
-    };
     let mut parts: Vec<Part> = Vec::new();
     let mut in_brick = 0;
-    for (i, brick, local) in places() {
+    for (i, brick, local) in patches.placed(grid) {
+        let local = local.as_dvec3();
         if brick != in_brick {
             add_up(&mut parts, corner(in_brick), &mut all);
             in_brick = brick;
@@ -235,8 +231,8 @@ pub(super) fn decide(
     if !parts.is_empty() {
         add_up(&mut parts, corner(in_brick), &mut all);
     }
-    for (i, brick, local) in places() {
-        let (sums, place) = (&mut all[signs.component[i] as usize], corner(brick) + local);
+    for (i, brick, local) in patches.placed(grid) {
+        let (sums, place) = (&mut all[signs.component[i] as usize], corner(brick) + local.as_dvec3());
         sums.reach += f64::from(patches.all[i].points) * place.distance(sums.place / sums.points as f64);
     }
     all.sort_unstable_by_key(|sums| (Reverse(sums.points), sums.number));

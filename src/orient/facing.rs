@@ -2,12 +2,12 @@
 
 use super::air::Sights;
 use super::components::{Decision, Side};
-use super::looks::{Look, Looks};
+use super::looks::{Look, Looks, Votes};
 use super::patches::{Patches, signed};
 use super::signs::{LEAST_PATCHES, Signs};
 use crate::error::Error;
 use crate::grid::Grid;
-use crate::lists::filled;
+use crate::lists::{filled, grow};
 use crate::progress::Stage;
 
 /// What errors call the memory of all this.
@@ -18,6 +18,11 @@ const WHAT: &str = "the facing of surfaces";
 /// leave turn some of them. The largest surface is what the others stand on or before, so fewer decide.
 const SURE: f64 = 16.0;
 const SURE_OF_LARGEST: f64 = 5.0;
+
+/// What stands before a surface looks at it with much of itself, what lies behind it with what shows past its edge only: the
+/// looks of one surface at another are worth so much for each of its patches, or count nothing. Furniture in a corner has 0.5
+/// and more, parts of a body that was seen from one side up to 0.1. A few patches may look at anything.
+const LEAST_LOOKING: f64 = 0.3;
 
 /// Where the balance is less than this share of all, nothing is told however many look: shadows let looks through to the wrong
 /// side. After the first round there are more of these: a wall looks at the back of what was scanned from one side before it.
@@ -45,26 +50,6 @@ const MOST_CONFIDENCE: f64 = 0.5;
 /// Rounds at the most: in each, what was told in the one before looks out.
 const ROUNDS: usize = 8;
 
-/// What looks at a surface.
-#[derive(Clone, Copy, Default)]
-struct Votes {
-    /// At the side that its normals point to, less at the other.
-    balance: f64,
-    all: f64,
-}
-
-impl Votes {
-    fn add(&mut self, vote: f32) {
-        self.balance += f64::from(vote);
-        self.all += f64::from(vote.abs());
-    }
-
-    /// Whether they are at one side, but for so much.
-    fn agree(&self, share: f64) -> bool {
-        self.balance.abs() > share * self.all
-    }
-}
-
 /// How much a surface is looked at, by others and by its own parts.
 #[derive(Clone, Copy, Default)]
 struct Looked {
@@ -76,9 +61,9 @@ impl Looked {
     /// What counts of the looks at a surface; each stands for `step`.
     fn count(&self, decision: &Decision, is_largest: bool, step: usize) -> Votes {
         let Self { others, own } = *self;
-        let is_ground = is_largest && decision.volume < BULGE && own.agree(AGREED);
+        let is_ground = is_largest && decision.volume.abs() < BULGE && own.agreement() > AGREED;
         let is_clear = own.balance.abs() * step as f64 > LEAST_OWN * decision.patches as f64;
-        if decision.volume < HOLLOW || is_ground && is_clear {
+        if decision.volume.abs() < HOLLOW || is_ground && is_clear {
             Votes { balance: others.balance + own.balance, all: others.all + own.all }
         } else {
             others
@@ -108,7 +93,7 @@ pub(super) fn turn_to_what_looks(
     let mut is_settled = filled(false, decisions.len(), WHAT)?;
     for (is_settled, decision) in is_settled.iter_mut().zip(&*decisions) {
         let is_closed = decision.component.side == Side::Air;
-        *is_settled = is_closed || decision.patches < LEAST_PATCHES || is_alone && decision.volume >= BULGE;
+        *is_settled = is_closed || decision.patches < LEAST_PATCHES || is_alone && decision.volume.abs() >= BULGE;
     }
     if !is_settled.contains(&false) {
         return Ok(());
@@ -120,11 +105,11 @@ pub(super) fn turn_to_what_looks(
         None => Looks::from_the_open(grid, patches, sights)?,
     };
     let agrees = |look: &Look| look.is_against == signs.flipped[look.from as usize];
-    let looked = looked_at(&looks, signs, &is_settled, &agrees)?;
+    let looked = looked_at(&looks, signs, decisions, &is_settled, &agrees)?;
     let mut fresh = tell(looked, looks.step, ONE_SIDED, signs, decisions, &mut is_settled)?;
 
     for (is_settled, decision) in is_settled.iter_mut().zip(&*decisions) {
-        *is_settled |= decision.volume >= FLAT;
+        *is_settled |= decision.volume.abs() >= FLAT;
     }
     for round in 1..ROUNDS {
         if !fresh.contains(&true) || !is_settled.contains(&false) {
@@ -133,7 +118,7 @@ pub(super) fn turn_to_what_looks(
         stage.tell(round as f64 / ROUNDS as f64)?;
         let front_side = |patch: usize| fresh[component(signs, patch)].then_some(signs.flipped[patch]);
         let looks = Looks::of(grid, patches, &front_side)?;
-        let looked = looked_at(&looks, signs, &is_settled, &|_| true)?;
+        let looked = looked_at(&looks, signs, decisions, &is_settled, &|_| true)?;
         fresh = tell(looked, looks.step, ONE_SIDED_LATER, signs, decisions, &mut is_settled)?;
     }
     Ok(())
@@ -152,7 +137,7 @@ fn tell(
     for (i, looked) in looked.into_iter().enumerate() {
         let votes = looked.count(&decisions[i], i == 0, step);
         let (Votes { balance, all }, sure) = (votes, if i == 0 { SURE_OF_LARGEST } else { SURE });
-        if balance * balance > sure * all && votes.agree(one_sided) {
+        if balance * balance > sure * all && votes.agreement() > one_sided {
             (is_settled[i], fresh[i], is_turned[i]) = (true, true, balance < 0.0);
             let component = &mut decisions[i].component;
             (component.side, component.confidence) = (Side::Sight, MOST_CONFIDENCE * balance.abs() / all);
@@ -168,18 +153,37 @@ fn tell(
 fn looked_at(
     looks: &Looks,
     signs: &Signs,
+    decisions: &[Decision],
     is_settled: &[bool],
     counts: &dyn Fn(&Look) -> bool,
 ) -> Result<Vec<Looked>, Error> {
     let mut looked = filled(Looked::default(), is_settled.len(), WHAT)?;
+    // What looks at what, and the vote.
+    let mut others = Vec::new();
     for look in &looks.all {
-        let (from, to) = (look.from as usize, look.to as usize);
-        let component = signs.component[to];
-        let is_own = component == signs.component[from];
-        if !is_settled[component as usize] && (is_own || counts(look)) {
-            let Looked { others, own } = &mut looked[component as usize];
-            let votes = if is_own { own } else { others };
-            votes.add(signed(signs.flipped[to], look.along));
+        let (to, from) = (signs.component[look.to as usize], signs.component[look.from as usize]);
+        if is_settled[to as usize] {
+            continue;
+        }
+        let vote = signed(signs.flipped[look.to as usize], look.along);
+        if to == from {
+            looked[to as usize].own.add(vote);
+        } else if counts(look) {
+            grow(&mut others, 1, WHAT)?;
+            others.push((to, from, vote));
+        }
+    }
+    // By the vote, too: sums of the same numbers in another order would be others.
+    others.sort_unstable_by_key(|&(to, from, vote)| (to, from, vote.to_bits()));
+    for pair in others.chunk_by(|one, next| (one.0, one.1) == (next.0, next.1)) {
+        let (to, from, _) = pair[0];
+        let mut votes = Votes::default();
+        pair.iter().for_each(|&(_, _, vote)| votes.add(vote));
+        let lookers = decisions[from as usize].patches;
+        if lookers >= LEAST_PATCHES && votes.balance.abs() * looks.step as f64 > LEAST_LOOKING * lookers as f64 {
+            let others = &mut looked[to as usize].others;
+            others.balance += votes.balance;
+            others.all += votes.all;
         }
     }
     Ok(looked)

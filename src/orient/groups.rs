@@ -77,11 +77,11 @@ impl Groups {
 
     /// Whether to flip each patch, so that the sum of all evidence becomes large. Linear in the links.
     pub fn signs(&self, stage: &Stage) -> Result<Vec<bool>, Error> {
-        let mut flipped = self.descend(1.0, None, &stage.part(0.0..0.4))?;
+        let mut flipped = self.descend(Trust::Times(1.0), &[], &stage.part(0.0..0.4))?;
         let Some(Level { links, own, .. }) = self.levels.first() else { return Ok(flipped) };
         // Flipping one small group after the other does not reach a far better choice behind worse ones, as where both
         // sides of a thin noisy wall were taken for one.
-        let bold = self.descend(BOLDNESS, None, &stage.part(0.4..0.8))?;
+        let bold = self.descend(Trust::Times(BOLDNESS), &[], &stage.part(0.4..0.8))?;
         // Both were mended last of all.
         if bold == flipped {
             return Ok(flipped);
@@ -100,17 +100,19 @@ impl Groups {
     }
 
     /// Signs for components whose evidence from the air may mislead. It adds up with a group's area, that of links only with
-    /// its rim; so here it is divided by the root of the group's size, and looks between its patches are added.
-    pub fn cautious_signs(&self, looks: &Looks, sights: &Sights, stage: &Stage) -> Result<Vec<bool>, Error> {
-        let mut links = self.across_the_air(looks, sights)?;
+    /// its rim; so here it is divided by the root of the group's size. Looks between its patches are added, if any.
+    pub fn cautious_signs(&self, looks: Option<&Looks>, sights: &Sights, stage: &Stage) -> Result<Vec<bool>, Error> {
         let mut levels = Vec::new();
-        reserve(&mut levels, self.levels.len(), GRAPH)?;
-        for (number, Level { group, flipped, .. }) in self.levels.iter().enumerate() {
-            let groups = group.iter().max().map_or(0, |&last| last as usize + 1);
-            let merged = gather(&links, group, flipped, groups, &stage.part(0.0..0.5).part(rest(number)))?;
-            levels.push(std::mem::replace(&mut links, merged));
+        if let Some(looks) = looks {
+            let mut links = self.across_the_air(looks, sights)?;
+            reserve(&mut levels, self.levels.len(), GRAPH)?;
+            for (number, Level { group, flipped, .. }) in self.levels.iter().enumerate() {
+                let groups = group.iter().max().map_or(0, |&last| last as usize + 1);
+                let merged = gather(&links, group, flipped, groups, &stage.part(0.0..0.5).part(rest(number)))?;
+                levels.push(std::mem::replace(&mut links, merged));
+            }
         }
-        self.descend(1.0, Some(&levels), &stage.part(0.5..1.0))
+        self.descend(Trust::ByRim, &levels, &stage.part(0.5..1.0))
     }
 
     /// What the looks of the patches of each component at each other say, but for those at the back of what itself sees the open
@@ -125,9 +127,9 @@ impl Groups {
         Links::both_ways(self.component.len(), told.map(link))
     }
 
-    /// From the components to the patches: whatever gains by being flipped is. `trust` is the weight of what speaks for a sign
-    /// by itself; where there are links across the air, for each level, it counts in a group like its rim.
-    fn descend(&self, trust: f32, across: Option<&[Links]>, stage: &Stage) -> Result<Vec<bool>, Error> {
+    /// From the components to the patches: whatever gains by being flipped is. `across`: links across the air for each level, or
+    /// none.
+    fn descend(&self, trust: Trust, across: &[Links], stage: &Stage) -> Result<Vec<bool>, Error> {
         let mut flipped = filled(false, self.own.len(), GRAPH)?;
         flipped.iter_mut().zip(&self.own).for_each(|(flipped, own)| *flipped = *own < 0.0);
         for (number, Level { links, own, sizes, group, flipped: within }) in self.levels.iter().enumerate().rev() {
@@ -136,19 +138,24 @@ impl Groups {
                 *finer = within ^ flipped[group as usize];
             }
             flipped = finer;
-            let rim = |one: usize| if across.is_some() { (sizes[one] as f32).sqrt().recip() } else { 1.0 };
-            let share = |one: usize| trust * own[one] * rim(one);
+            let share = |one: usize| match trust {
+                Trust::Times(weight) => weight * own[one],
+                Trust::ByRim => own[one] / (sizes[one] as f32).sqrt(),
+            };
             let Range { start, end } = rest(number);
-            mend(
-                links,
-                across.map(|across| &across[number]),
-                &share,
-                &mut flipped,
-                &stage.part(1.0 - end..1.0 - start),
-            )?;
+            mend(links, across.get(number), &share, &mut flipped, &stage.part(1.0 - end..1.0 - start))?;
         }
         Ok(flipped)
     }
+}
+
+/// What speaks for the sign of a group by itself, against links.
+#[derive(Clone, Copy)]
+enum Trust {
+    /// So many times as much as there is.
+    Times(f32),
+    /// As if only along its rim.
+    ByRim,
 }
 
 /// Of a stage that goes through the levels from the first on, the part of one: each has about twice as many groups as the next.

@@ -88,6 +88,26 @@ impl Looks {
     }
 }
 
+/// What looks at a surface.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Votes {
+    /// At the side that its normals point to, less at the other.
+    pub balance: f64,
+    pub all: f64,
+}
+
+impl Votes {
+    pub fn add(&mut self, vote: f32) {
+        self.balance += f64::from(vote);
+        self.all += f64::from(vote.abs());
+    }
+
+    /// How much of them are at one side, from 0 to 1.
+    pub fn agreement(&self) -> f64 {
+        if self.all > 0.0 { self.balance.abs() / self.all } else { 0.0 }
+    }
+}
+
 /// The occupied cubes, and the box round them.
 struct Rays<'a> {
     grid: &'a Grid,

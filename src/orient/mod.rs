@@ -3,8 +3,8 @@
 //! `docs/orientation.md` explains the rule, its sources and its limits. In short: the points of each small cube are parted
 //! into patches ([`patches`]), a patch and those round it say whether their signs agree ([`links`]), which sides of a patch
 //! are open to the air says which way is out ([`air`]), and the signs are chosen that these agree with best ([`groups`]), of
-//! open surfaces also what their parts see of each other ([`looks`]). These then face what stands before them ([`facing`]). In
-//! noise normals then become means of those about them ([`means`]).
+//! open surfaces also what their parts see of each other ([`looks`]). These then face what stands before them ([`facing`]), or the
+//! scanner, if it saw all from one side ([`view`]). In noise normals then become means of those about them ([`means`]).
 
 mod air;
 mod components;
@@ -16,6 +16,7 @@ mod looks;
 mod means;
 mod patches;
 mod signs;
+mod view;
 
 pub use components::{Component, Components, Side};
 
@@ -27,13 +28,16 @@ use crate::options::{Cell, Method, Options, Orient};
 use crate::parallel::{self, Scatter};
 use crate::points::{Bounds, CHUNK, Points};
 use crate::progress::Stage;
+use air::Sights;
 use components::decide;
 use cubes::Cubes;
 use glam::{DVec3, Vec3};
 use groups::Groups;
 use links::Links;
+use looks::Looks;
 use patches::{Members, Patches};
-use signs::Signs;
+use signs::{Choice, Signs};
+use view::View;
 
 /// What was found out about the surfaces of a cloud.
 pub(crate) struct Surfaces {
@@ -113,13 +117,16 @@ fn surfaces(
     let sights = air::sights(grid, &patches, points.len(), &stage.part(0.5..0.55))?;
     let links = Links::of(grid, &patches, *noise, &stage.part(0.55..0.7))?;
     let groups = Groups::of(links, &sights, &patches, &stage.part(0.7..0.85))?;
-    let choice = stage.part(0.85..0.9);
-    let (mut signs, looks) = match options.orient {
-        Orient::Outward => (Signs::outward(groups, &choice)?, None),
-        _ => Signs::consistent(groups, grid, &patches, &sights, &choice)?,
+    let mut choice = Choice::of(groups, &sights, &stage.part(0.85..0.87))?;
+    let (looks, view) = match options.orient {
+        Orient::Outward => (None, None),
+        _ => be_consistent(&mut choice, grid, &patches, *noise, &sights, &stage.part(0.87..0.9))?,
     };
+    let mut signs = choice.into_signs();
     let mut decisions = decide(grid, &patches, &sights, &mut signs)?;
-    if options.orient == Orient::Consistent {
+    if let Some(view) = view {
+        view.turn_to_the_scanner(grid, &patches, looks.as_ref(), &mut signs, &mut decisions)?;
+    } else if options.orient == Orient::Consistent {
         let facing = stage.part(0.9..0.95);
         facing::turn_to_what_looks(grid, &patches, &sights, looks, &mut signs, &mut decisions, &facing)?;
     }
@@ -131,6 +138,29 @@ fn surfaces(
     }
     last.tell(1.0)?;
     Ok(Surfaces { components, of_point })
+}
+
+/// Trusts no part of the open that may mislead: of what is not closed the edges count, and then what its patches see of each
+/// other; but not where all was seen from one side, because the hollow side of that looks at itself. Answers these looks, if
+/// there is anything that is not closed, and the view, if it is one.
+fn be_consistent(
+    choice: &mut Choice,
+    grid: &Grid,
+    patches: &Patches,
+    noise: f32,
+    sights: &Sights,
+    stage: &Stage,
+) -> Result<(Option<Looks>, Option<View>), Error> {
+    if choice.is_all_closed() {
+        return Ok((None, View::of(grid, patches, noise, choice.signs())?));
+    }
+    let looks = Looks::from_the_open(grid, patches, sights)?;
+    choice.be_cautious(None, sights, &stage.part(0.0..0.4))?;
+    let view = View::of(grid, patches, noise, choice.signs())?;
+    if view.is_none() {
+        choice.be_cautious(Some(&looks), sights, &stage.part(0.4..1.0))?;
+    }
+    Ok((Some(looks), view))
 }
 
 /// Gives every point the sign of its patch, and tells the component of each if asked to.

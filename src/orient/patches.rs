@@ -182,6 +182,14 @@ impl Patches {
     pub fn of_cube(&self, cube: usize) -> Range<usize> {
         self.first[cube]..self.first[cube + 1]
     }
+
+    /// The numbers of all patches, their bricks, and where they are in those, in edges.
+    pub fn placed<'a>(&'a self, grid: &'a Grid) -> impl Iterator<Item = (usize, usize, Vec3)> + 'a {
+        (0..grid.blocks.len()).flat_map(|block| grid.cubes_in(block)).flat_map(move |(brick, cube, bit)| {
+            let centre = cube_centre(bit);
+            self.of_cube(cube).map(move |patch| (patch, brick, centre + self.all[patch].centre))
+        })
+    }
 }
 
 /// Parts the points of one cube; `normals` are theirs. There is room in `order` for all of them, and for the patches.

@@ -3,10 +3,9 @@
 use super::air::Sights;
 use super::groups::Groups;
 use super::looks::Looks;
-use super::patches::{Patches, signed};
+use super::patches::signed;
 use crate::error::Error;
-use crate::grid::Grid;
-use crate::lists::filled;
+use crate::lists::{filled, fitted};
 use crate::progress::Stage;
 
 /// What errors call the memory of all this.
@@ -30,36 +29,45 @@ pub(super) const CLOSED: f64 = 0.6;
 pub(super) const LEAST_PATCHES: u64 = 32;
 const SMALL: f64 = 0.01;
 
-impl Signs {
+/// How much of the open is counted.
+pub(super) struct Choice {
+    groups: Groups,
+    signs: Signs,
+    /// For each component whether it is closed, or small.
+    is_closed: Vec<bool>,
+}
+
+impl Choice {
     /// Counts all that lies in the open.
-    pub fn outward(groups: Groups, stage: &Stage) -> Result<Self, Error> {
+    pub fn of(groups: Groups, sights: &Sights, stage: &Stage) -> Result<Self, Error> {
         let flipped = groups.signs(stage)?;
-        Ok(Self { flipped, components: groups.components(), component: groups.component })
+        let is_closed = closed(&groups, sights, &flipped)?;
+        let signs = Signs { flipped, components: groups.components(), component: fitted(&groups.component, WHAT)? };
+        Ok(Self { groups, signs, is_closed })
     }
 
-    /// Counts all that lies in the open for components that are closed then, or small, and for others a share, beside the looks
-    /// of their patches at each other, which are answered if there are any such.
-    pub fn consistent(
-        groups: Groups,
-        grid: &Grid,
-        patches: &Patches,
-        sights: &Sights,
-        stage: &Stage,
-    ) -> Result<(Self, Option<Looks>), Error> {
-        let mut flipped = groups.signs(&stage.part(0.0..0.5))?;
-        let is_closed = closed(&groups, sights, &flipped)?;
-        let mut looks = None;
-        if is_closed.contains(&false) {
-            let seen = Looks::from_the_open(grid, patches, sights)?;
-            let cautious = groups.cautious_signs(&seen, sights, &stage.part(0.5..1.0))?;
-            for ((flipped, cautious), &component) in flipped.iter_mut().zip(cautious).zip(&groups.component) {
-                if !is_closed[component as usize] {
-                    *flipped = cautious;
-                }
+    pub fn is_all_closed(&self) -> bool {
+        !self.is_closed.contains(&false)
+    }
+
+    /// Counts a share, for components that are not closed, nor small, beside the looks of their patches at each other, if any.
+    pub fn be_cautious(&mut self, looks: Option<&Looks>, sights: &Sights, stage: &Stage) -> Result<(), Error> {
+        let cautious = self.groups.cautious_signs(looks, sights, stage)?;
+        let Signs { flipped, component, .. } = &mut self.signs;
+        for ((flipped, cautious), &component) in flipped.iter_mut().zip(cautious).zip(&*component) {
+            if !self.is_closed[component as usize] {
+                *flipped = cautious;
             }
-            looks = Some(seen);
         }
-        Ok((Self { flipped, components: groups.components(), component: groups.component }, looks))
+        Ok(())
+    }
+
+    pub fn signs(&self) -> &Signs {
+        &self.signs
+    }
+
+    pub fn into_signs(self) -> Signs {
+        self.signs
     }
 }
 

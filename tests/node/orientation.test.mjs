@@ -11,6 +11,7 @@ import { MOST_SECONDS, rightSigns, verdicts } from '../../benches/orientation/ju
 import { FULL, MODES, SMALL, measureAll, plannedRows, withOutside } from '../../benches/orientation/measure.mjs';
 import { details, report } from '../../benches/orientation/report.mjs';
 import { SHAPES } from '../../benches/orientation/shapes.mjs';
+import { seenFrom } from '../../benches/orientation/single.mjs';
 import { signedVolume, thickness, windingNumber } from '../../benches/orientation/solid.mjs';
 import { createEstimator } from '../../dist/node.js';
 import { temporaryFolder } from './packed.mjs';
@@ -115,8 +116,8 @@ describe('the small run', () => {
   });
 
   test('tells times, and the surfaces', () => {
-    for (const { modes, variant, large } of rows) {
-      assert.equal(large > 0, variant === 'clean');
+    for (const { modes, variant, kind, large } of rows) {
+      assert.equal(large > 0, variant === 'clean' && kind !== 'view');
       assert.deepEqual(Object.keys(modes), MODES);
       for (const { components, largest, seconds } of Object.values(modes)) {
         assert.ok(components >= 1 && largest.points > 0 && largest.confidence >= 0 && largest.confidence <= 1);
@@ -247,6 +248,12 @@ test('what is asked of a row', () => {
   assert.deepEqual(judged({ ...mesh, variant: 'clean' }, signs(0.999)), [[0.999, true, true]]);
   assert.deepEqual(judged({ ...mesh, variant: 'stripes' }, signs(0.97)), [[0.97, true, true]]);
   assert.deepEqual(judged({ kind: 'ranges', variant: 'as it is' }, signs(0.9989)), [[0.999, false, false]]);
+  // 'outward' is not for what was seen from one side.
+  const both = { consistent: { signs: { all: signs(0.995) } }, outward: { signs: { all: signs(0) } } };
+  for (const kind of ['view', 'scene']) {
+    const [verdict, ...others] = verdicts({ kind, variant: 'clean', open: false, sides: true, modes: both });
+    assert.deepEqual([verdict.mode, verdict.met, others], ['consistent', true, []]);
+  }
 });
 
 describe('the shapes', () => {
@@ -309,6 +316,35 @@ describe('meshes', () => {
     const close = (value, expected) => assert.ok(Math.abs(value - expected) < 1e-9, `${value}`);
     close(windingNumber(corners, [0.5, 1, 0.2]), 1);
     close(windingNumber(corners, [0.5, 1, 0.3]), 0);
+  });
+
+  test('are seen from one place', () => {
+    // The second box stands in the shadow of the first, but for a rim: the scanner is near.
+    const { corners, sampler } = meshesOf({ row: [BOX, box([0, 0, -3], [1, 2, -2], 8)] }).meshes[0];
+    const seen = cloudOf(seenFrom([0, 0, 1], corners, sampler), 4_000, {}, 3);
+    const at = (i) => [seen.positions, seen.normals].map((values) => [...values.subarray(3 * i, 3 * i + 3)]);
+    const all = Array.from({ length: 4_000 }, (_, i) => at(i));
+    assert.ok(
+      all.every(([, normal]) => normal[2] === 1),
+      'only what faces the scanner',
+    );
+    assert.ok(
+      all.every(([place]) => Math.abs(place[2] - 0.25) < 1e-6),
+      'nothing in the shadow',
+    );
+    const fromTheCorner = cloudOf(seenFrom([1, 1, 1], corners, sampler), 4_000, {}, 3);
+    const sides = new Set();
+    for (let i = 0; i < 4_000; i++) sides.add([...fromTheCorner.normals.subarray(3 * i, 3 * i + 3)].join());
+    assert.deepEqual([...sides].sort(), ['0,0,1', '0,1,0', '1,0,0']);
+    // As many points in every direction: what is nearer has more.
+    const [near, far] = [1, -1].map((side) => {
+      const isThere = (x, y) => side * (x - 0.5) > 0.25 && side * (y - 1) > 0.5;
+      return [...Array(4_000).keys()].filter((i) => {
+        const [x, y, z] = fromTheCorner.positions.subarray(3 * i, 3 * i + 3);
+        return z > 0.2 && fromTheCorner.normals[3 * i + 2] === 1 && isThere(x, y);
+      }).length;
+    });
+    assert.ok(near > 1.1 * far && far > 20, `${near} near, ${far} far`);
   });
 
   test('have walls of a thickness', () => {

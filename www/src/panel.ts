@@ -211,6 +211,7 @@ const WAYS = {
   air: ['outwards', 'inwards'],
   volume: ['away from the middle', 'towards the middle'],
   sight: ['to what stands before it', 'from what stands before it'],
+  view: ['to the scanner', 'from the scanner'],
 } as const;
 
 /** Below it, the side is little more than a guess. */
