@@ -218,6 +218,16 @@ fn thin_objects_are_no_noise() {
     }
 }
 
+/// Parts of a cube with a quarter of its points know less where noise is as wide as they are, so there are none.
+#[test]
+fn noise_is_not_divided() {
+    let cloud = terrain(100_000, 15).noisy(0.006, 5);
+    let (angles, result) = errors(&cloud);
+    let error = root_mean_square(&angles);
+    println!("{error} degrees, {} cubes", result.report.cells);
+    assert!(error < 6.5 && result.report.cells < 10_000, "{error} degrees, {} cubes", result.report.cells);
+}
+
 /// Waves shorter than the cubes that 'auto' begins with, ten point spacings.
 #[test]
 fn corrugations_are_no_noise() {

@@ -63,6 +63,12 @@ const UNSURE: f32 = 0.07;
 /// A cube is in noise where one in so many cubes near it is a plane in noise.
 const IN_NOISE: usize = 10;
 
+/// Parts of cubes that were divided before know less than these where noise has so much variance, in square edges.
+const WIDE: f32 = 0.1;
+
+/// Where a sheet goes on, so many cubes within two are occupied; small objects have fewer.
+const SHEET: usize = 25;
+
 /// Faces are told by points where a surface has more noise than this, in edges and squared: it may lie across an edge,
 const TORN: f32 = 0.0064;
 
@@ -175,13 +181,27 @@ impl<'a> Task<'a> {
             let near = self.around.near(&level.grid, brick, bit, 2);
             is_edge = has_many && self.faces.find(level, bit, near, chosen);
             if !is_edge {
-                // Else noise hides what the parts could tell, also of an edge in this very cube.
-                let in_noise = |near: &&Near| level.surfaces[near.cube as usize].is_plane_in_noise;
-                if can_divide && IN_NOISE * near.iter().filter(in_noise).count() < near.len() {
-                    return Role::Wanted;
+                let noise = || quartile(near.iter().map(|near| chosen[near.cube as usize].flat_noise));
+                if can_divide {
+                    let (mut planes, mut showing) = (0, 0);
+                    for near in near {
+                        let surface = &level.surfaces[near.cube as usize];
+                        planes += usize::from(surface.is_plane_in_noise);
+                        showing += usize::from(surface.is_some() && surface.shows(surface.noise));
+                    }
+                    // Noise hides what the parts could tell, also of an edge in this very cube: there is a plane in noise, or it
+                    // is as wide as the parts, and most surfaces show it within their samples.
+                    let is_wide = || {
+                        division > 0
+                            && near.len() >= SHEET
+                            && 2 * showing >= near.len()
+                            && (WIDE..f32::INFINITY).contains(&noise())
+                    };
+                    if IN_NOISE * planes < near.len() && !is_wide() {
+                        return Role::Wanted;
+                    }
                 }
-                let noises = near.iter().map(|near| chosen[near.cube as usize].flat_noise);
-                self.ballot.invite(near, chosen, quartile(noises));
+                self.ballot.invite(near, chosen, noise());
             }
         }
         let placed = level.points(cube);
