@@ -474,24 +474,22 @@ fn what_is_hollow_does_not_face_itself() {
     }
 }
 
-/// Balls, `(middle, radius)`, or their insides, as a scanner at (0, 0, `distance`) sees them, which looks down so far to each
-/// side as `spread` at a distance of 1: as many points in every direction.
-fn view_of(balls: &[([f64; 3], f64)], from_inside: bool, distance: f64, spread: f64, count: usize) -> Cloud {
+/// Balls, `(middle, radius)`, as a camera at (0, 0, 5) sees them, which looks down.
+fn view_of(balls: &[([f64; 3], f64)], count: usize) -> Cloud {
+    let camera = 5.0;
     let mut random = Random(71);
-    let mut ray = move || unit([spread * random.signed(), spread * random.signed(), -1.0]);
+    let mut ray = move || unit([0.44 * random.signed(), 0.44 * random.signed(), -1.0]);
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let first = |along: [f64; 3]| {
         let hits = balls.iter().filter_map(|&(middle, radius)| {
-            let to = [middle[0], middle[1], middle[2] - distance];
-            let (closest, squared) = (dot(to, along), dot(to, to) - radius * radius);
-            let half = (closest * closest - squared).max(0.0).sqrt();
-            let depth = if from_inside { closest + half } else { closest - half };
-            let side = if from_inside { -1.0 } else { 1.0 };
-            let normal = [0, 1, 2].map(|axis| side * (depth * along[axis] - to[axis]) / radius);
-            (half > 0.0).then_some((depth, normal))
+            let to = [middle[0], middle[1], middle[2] - camera];
+            let closest = dot(to, along);
+            let half = (closest * closest - dot(to, to) + radius * radius).max(0.0).sqrt();
+            let depth = closest - half;
+            (half > 0.0).then(|| (depth, [0, 1, 2].map(|axis| (depth * along[axis] - to[axis]) / radius)))
         });
         let (depth, normal) = hits.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(([depth * along[0], depth * along[1], distance + depth * along[2]], normal))
+        Some(([depth * along[0], depth * along[1], camera + depth * along[2]], normal))
     };
     Cloud::of(std::iter::repeat_with(|| first(ray())).flatten().take(count).map(|(p, n)| (turn(p), turn(n))))
 }
@@ -502,7 +500,7 @@ fn view_of(balls: &[([f64; 3], f64)], from_inside: bool, distance: f64, spread: 
 fn what_was_seen_from_one_side_faces_it() {
     let balls = [([0.0, 0.0, 0.0], 1.0), ([1.0, 0.3, -1.3], 0.5), ([-0.9, 0.7, -1.0], 0.45), ([0.1, -1.2, -0.6], 0.4)];
     for noise in [0.0, 0.0012] {
-        let cloud = view_of(&balls, false, 5.0, 0.44, 80_000).noisy(noise, 3);
+        let cloud = view_of(&balls, 80_000).noisy(noise, 3);
         for mirrored in [false, true] {
             let flip = |[x, y, z]: [f64; 3]| [if mirrored { -x } else { x }, y, z];
             let points = cloud.points.chunks_exact(3).flat_map(|p| [if mirrored { -p[0] } else { p[0] }, p[1], p[2]]);
@@ -538,6 +536,29 @@ fn what_is_nearer_to_a_scanner_is_denser() {
         let right = share_right(&result.normals, &cloud.normals);
         assert_eq!(right, 1.0, "{height}: {:?}", components(&result));
         assert_eq!(components(&result)[0].side, Side::View);
+    }
+}
+
+/// A floor is seen from one side, and a ball over it from all.
+#[test]
+fn what_was_scanned_all_round_is_no_part_of_a_view() {
+    for share in [0.02, 0.05, 0.15] {
+        let mut random = Random(75);
+        // As many points a piece of surface as on the floor, which is 2 wide.
+        let radius = (share / std::f64::consts::PI).sqrt();
+        let cloud = Cloud::of((0..80_000).map(|_| {
+            let is_of_ball = random.unit() < share;
+            let direction = random.direction();
+            let (point, normal) = if is_of_ball {
+                ([0, 1, 2].map(|axis| radius * direction[axis] + [0.1, 0.0, 0.6][axis]), direction)
+            } else {
+                ([random.signed(), random.signed(), 0.0], [0.0, 0.0, 1.0])
+            };
+            (turn(point), turn(normal))
+        }));
+        let result = orient(&cloud.points, Orient::Consistent);
+        let right = share_right(&result.normals, &cloud.normals);
+        assert_eq!(right, 1.0, "{share}: {:?}", components(&result));
     }
 }
 

@@ -127,7 +127,7 @@ export interface Report {
    * from the middle of what is open or hidden, or, of what is long and thin, from the middles of its pieces; `'sight'`, because
    * other surfaces, or its own parts, stand before that side; `'view'`, because the cloud is what a scanner saw from that side
    * (both by `'consistent'` only); `'convention'`, because it is open and flat, so that nothing tells: the mean normal has
-   * `x + 2y + 4z >= 0`. `confidence`, from 0, a guess, to 1, which is sure: of all that is seen of the open, how much more is
+   * `x + 2y + 4z >= 0`, where all was seen from one side that of all surfaces. `confidence`, from 0, a guess, to 1, which is sure: of all that is seen of the open, how much more is
    * seen from one side; for what sees nothing of it how much volume there is, of that of a sphere, or of its pieces; by sight,
    * half of how much more looks at that side, of all that does; by view, up to a half. Only with `orient: 'consistent'` and
    * `'outward'`.

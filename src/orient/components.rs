@@ -54,7 +54,8 @@ pub enum Side {
     Sight,
     /// The scanner: all of the cloud was seen from one side.
     View,
-    /// Nothing: the surface is open and flat. By convention `x + 2y + 4z >= 0` for its mean normal.
+    /// Nothing: the surface is open and flat. By convention `x + 2y + 4z >= 0` for its mean normal; where all was seen from one
+    /// side for that of all.
     Convention,
 }
 

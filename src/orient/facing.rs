@@ -20,7 +20,7 @@ const SURE: f64 = 16.0;
 const SURE_OF_LARGEST: f64 = 5.0;
 
 /// What stands before a surface looks at it with much of itself, what lies behind it with what shows past its edge only: the
-/// looks of one surface at another are worth so much for each of its patches, or count nothing. Furniture in a corner has 0.5
+/// looks of one surface at another are worth so much for each of its patches, or count nothing. Furniture in a corner has 0.4
 /// and more, parts of a body that was seen from one side up to 0.1. A few patches may look at anything.
 const LEAST_LOOKING: f64 = 0.3;
 
@@ -187,4 +187,29 @@ fn looked_at(
         }
     }
     Ok(looked)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::components::Component;
+    use super::*;
+
+    /// One surface of a thousand patches, and one that looks at its front with some of its own.
+    #[test]
+    fn what_shows_past_an_edge_tells_nothing() {
+        let balance = |patches: u64, looks: usize| {
+            let component = Component { points: 0, side: Side::Volume, confidence: 0.0 };
+            let decisions = [1000, patches].map(|patches| Decision { component, patches, volume: 0.2 });
+            let component = (0..1000 + patches).map(|patch| u32::from(patch >= 1000)).collect();
+            let signs = Signs { flipped: vec![false; 1000 + patches as usize], component, components: 2 };
+            let look =
+                |i: usize| Look { from: 1000 + i as u32 % patches as u32, is_against: false, to: i as u32, along: 0.5 };
+            let looks = Looks { all: (0..looks).map(look).collect(), step: 2 };
+            looked_at(&looks, &signs, &decisions, &[false; 2], &|_| true).unwrap()[0].others.balance
+        };
+        assert_eq!(balance(100, 20), 0.0);
+        assert_eq!(balance(100, 40), 20.0);
+        assert_eq!(balance(40, 40), 20.0);
+        assert_eq!(balance(20, 40), 0.0, "few patches look at anything");
+    }
 }

@@ -117,12 +117,11 @@ fn surfaces(
     let sights = air::sights(grid, &patches, points.len(), &stage.part(0.5..0.55))?;
     let links = Links::of(grid, &patches, *noise, &stage.part(0.55..0.7))?;
     let groups = Groups::of(links, &sights, &patches, &stage.part(0.7..0.85))?;
-    let mut choice = Choice::of(groups, &sights, &stage.part(0.85..0.87))?;
-    let (looks, view) = match options.orient {
-        Orient::Outward => (None, None),
-        _ => be_consistent(&mut choice, grid, &patches, *noise, &sights, &stage.part(0.87..0.9))?,
+    let choice = stage.part(0.85..0.9);
+    let (mut signs, looks, view) = match options.orient {
+        Orient::Outward => (Signs::outward(groups, &choice)?, None, None),
+        _ => consistent(groups, grid, &patches, *noise, &sights, &choice)?,
     };
-    let mut signs = choice.into_signs();
     let mut decisions = decide(grid, &patches, &sights, &mut signs)?;
     if let Some(view) = view {
         view.turn_to_the_scanner(grid, &patches, looks.as_ref(), &mut signs, &mut decisions)?;
@@ -140,27 +139,28 @@ fn surfaces(
     Ok(Surfaces { components, of_point })
 }
 
-/// Trusts no part of the open that may mislead: of what is not closed the edges count, and then what its patches see of each
-/// other; but not where all was seen from one side, because the hollow side of that looks at itself. Answers these looks, if
+/// Signs that trust no part of the open that may mislead: of what is not closed a share counts, beside what its patches see of
+/// each other; but not where all was seen from one side, because the hollow side of that looks at itself. Also these looks, if
 /// there is anything that is not closed, and the view, if it is one.
-fn be_consistent(
-    choice: &mut Choice,
+fn consistent(
+    groups: Groups,
     grid: &Grid,
     patches: &Patches,
     noise: f32,
     sights: &Sights,
     stage: &Stage,
-) -> Result<(Option<Looks>, Option<View>), Error> {
-    if choice.is_all_closed() {
-        return Ok((None, View::of(grid, patches, noise, choice.signs())?));
+) -> Result<(Signs, Option<Looks>, Option<View>), Error> {
+    let mut choice = Choice::of(groups, sights, &stage.part(0.0..0.3))?;
+    let mut looks = None;
+    if !choice.is_all_closed() {
+        looks = Some(Looks::from_the_open(grid, patches, sights)?);
+        choice.be_cautious(None, sights, &stage.part(0.3..0.5))?;
     }
-    let looks = Looks::from_the_open(grid, patches, sights)?;
-    choice.be_cautious(None, sights, &stage.part(0.0..0.4))?;
-    let view = View::of(grid, patches, noise, choice.signs())?;
-    if view.is_none() {
-        choice.be_cautious(Some(&looks), sights, &stage.part(0.4..1.0))?;
+    let view = View::of(grid, patches, noise, choice.signs(), &stage.part(0.5..0.6))?;
+    if looks.is_some() && view.is_none() {
+        choice.be_cautious(looks.as_ref(), sights, &stage.part(0.6..1.0))?;
     }
-    Ok((Some(looks), view))
+    Ok((choice.into_signs(), looks, view))
 }
 
 /// Gives every point the sign of its patch, and tells the component of each if asked to.

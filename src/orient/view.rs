@@ -8,6 +8,8 @@ use crate::error::Error;
 use crate::grid::Grid;
 use crate::lattice::BRICK;
 use crate::lists::{filled, reserve};
+use crate::power::log2;
+use crate::progress::Stage;
 use glam::{DVec3, Vec3};
 
 /// What errors call the memory of all this.
@@ -20,7 +22,12 @@ const ENOUGH: f64 = 0.005;
 const MOST_AWAY: f64 = 0.08;
 const HOPELESS: f64 = 0.3;
 
-/// So few that face away are wrong signs, if they do so clearly: the cosine of 107 degrees.
+/// A component of which more than this share faces away, either way, was scanned all round, and is left alone. Of all it is no
+/// more than this share.
+const MIXED: f64 = 0.25;
+const MOST_MIXED: f64 = 0.2;
+
+/// So few that face away, of all and of a component, are wrong signs, if they do so clearly: the cosine of 107 degrees.
 const MISTAKES: f64 = 0.02;
 const CLEARLY_AWAY: f32 = -0.3;
 
@@ -32,32 +39,33 @@ const ROUNDS: usize = 20;
 const MOST_HIDDEN: f64 = 0.15;
 
 /// How far behind that is, in edges, besides what slopes and noise explain.
-const BEHIND: f32 = 0.25;
-const DEVIATIONS: f32 = 2.0;
+const BEHIND: f64 = 0.25;
+const DEVIATIONS: f64 = 2.0;
 
 /// Slopes beyond, by the cosine of the angle between normal and view, are no steeper.
 const STEEPEST: f32 = 0.05;
 
-/// What decides between the two sides, each divided by what makes it a clear sign: how far the volume lies behind the surfaces,
-/// how much what stands before others looks at them, for each patch, and how much denser what is nearer is, in standard
-/// errors, less where it may be chance, and no more than some of these: densities have other reasons, too.
-const BULGE: f64 = 0.15;
-const LOOKING: f64 = 0.005;
-const DENSER: f64 = 8.0;
-const CHANCE: f64 = 4.0;
+/// What tells at which end of the view the scanner was, each as large as makes it clear: how far the volume lies behind the
+/// surfaces, how much what stands before others looks at them, for each patch, and how much denser what is nearer is, but no
+/// more than some of these: densities have other reasons, too.
+const CLEAR_BULGE: f64 = 0.15;
+const CLEAR_LOOKING: f64 = 0.005;
+const CLEAR_DENSITY: f64 = 0.1;
 const MOST_BY_DENSITY: f64 = 3.0;
+
+/// Less of all these is a guess.
+const GUESS: f64 = 0.2;
 
 /// What holds less volume is flat: only that looks at itself from its front, and if so many of its looks agree.
 const FLAT: f64 = 0.05;
 const AGREED: f64 = 0.6;
 
-/// Less of all these is chance.
-const UNCLEAR: f64 = 0.2;
-
-/// Patches tell densities that face the scanner so well, by the cosine, are so many, and deviate so much in depth, in edges.
+/// Densities are told by patches that face the scanner so well, by the cosine; at least so many, which deviate so much in depth,
+/// in edges, besides being slanted; and by no less than so many standard errors.
 const FACING: f32 = 0.5;
 const LEAST_DENSITIES: f64 = 100.0;
 const LEAST_DEPTH: f64 = 1.0;
+const CHANCE: f64 = 4.0;
 
 /// The confidence where everything speaks for one side: no more, as it is told by what is likely.
 const MOST_CONFIDENCE: f64 = 0.5;
@@ -72,33 +80,37 @@ pub(super) struct View {
 }
 
 impl View {
-    /// That of a cloud, if it is one. Some passes over the patches, and a sort.
-    pub fn of(grid: &Grid, patches: &Patches, noise: f32, signs: &Signs) -> Result<Option<Self>, Error> {
+    /// That of a cloud, if it is one. Up to twice [`ROUNDS`] passes over the patches, two where it is closed, and a sort.
+    pub fn of(grid: &Grid, patches: &Patches, noise: f32, signs: &Signs, stage: &Stage) -> Result<Option<Self>, Error> {
         if patches.all.len() < LEAST_PATCHES as usize {
             return Ok(None);
         }
         let mut sums = filled(DVec3::ZERO, signs.components, WHAT)?;
-        for (patch, (&flipped, &component)) in each(patches, signs) {
-            sums[component as usize] += weighed(patch, flipped);
+        for (patch, flipped, component) in each(patches, signs) {
+            sums[component] += weighed(patch, flipped);
         }
-        let longest = sums.iter().copied().reduce(|a, b| if b.length_squared() > a.length_squared() { b } else { a });
-        let along = |normal: &DVec3| signed(longest.is_some_and(|longest| longest.dot(*normal) < 0.0), *normal);
-        let mut towards: DVec3 = sums.iter().map(along).sum();
+        let longest =
+            sums.iter().fold(DVec3::ZERO, |a, &b| if b.length_squared() > a.length_squared() { b } else { a });
+        let mut towards: DVec3 = sums.iter().map(|&normal| signed(longest.dot(normal) < 0.0, normal)).sum();
         // As a perceptron learns (Rosenblatt, 1958): towards what still faces away.
-        for _ in 0..ROUNDS {
-            let view = Self { towards: towards.normalize_or_zero().as_vec3() };
+        let mut best: Option<(Self, Turned)> = None;
+        for round in 0..ROUNDS {
+            stage.tell(round as f64 / ROUNDS as f64)?;
+            let Some(direction) = towards.try_normalize() else { break };
+            let view = Self { towards: direction.as_vec3() };
             let turned = view.turned(patches, signs)?;
-            if turned.away > HOPELESS {
-                return Ok(None);
+            towards = direction + 2.0 * turned.missed;
+            let away = turned.away.max(turned.mixed);
+            if best.as_ref().is_none_or(|(_, best)| away < best.away.max(best.mixed)) {
+                best = Some((view, turned));
             }
-            if turned.away <= ENOUGH {
+            if away > HOPELESS || away <= ENOUGH {
                 break;
             }
-            towards = view.towards.as_dvec3() + 2.0 * turned.missed;
         }
-        let view = Self { towards: towards.normalize_or_zero().as_vec3() };
+        let Some((view, turned)) = best else { return Ok(None) };
         let is_one =
-            view.turned(patches, signs)?.away <= MOST_AWAY && view.hidden(grid, patches, noise)? <= MOST_HIDDEN;
+            turned.away <= MOST_AWAY && turned.mixed <= MOST_MIXED && view.hidden(grid, patches, noise)? <= MOST_HIDDEN;
         Ok(is_one.then_some(view))
     }
 
@@ -106,7 +118,8 @@ impl View {
     ///
     /// At which end of the direction that was is told by three things: what was scanned has its volume behind what is seen of
     /// it; what looks at another surface stands before it; and of what is twice as far a scanner with rays in all directions,
-    /// or a camera, sees a quarter as many points.
+    /// or a camera, sees a quarter as many points. Where nothing tells, one surface stays as it is, and of more the mean of all
+    /// normals is turned by convention.
     pub fn turn_to_the_scanner(
         &self,
         grid: &Grid,
@@ -116,50 +129,63 @@ impl View {
         decisions: &mut [Decision],
     ) -> Result<(), Error> {
         let turned = self.turned(patches, signs)?;
-        let denser = self.density(grid, patches);
-        let density = denser / DENSER * (denser.abs() / CHANCE).min(1.0);
-        let told = bulge(decisions, &turned) / BULGE
-            + looking(looks, signs, decisions, &turned) / LOOKING
-            + density.clamp(-MOST_BY_DENSITY, MOST_BY_DENSITY);
-        let is_clear = told.abs() >= UNCLEAR;
-        let is_from_behind = if is_clear { told < 0.0 } else { is_below(turned.normal) };
-        let confidence = MOST_CONFIDENCE * told.abs() / (1.0 + told.abs());
+        let told = bulge(decisions, &turned) / CLEAR_BULGE
+            + looking(looks, signs, decisions, &turned) / CLEAR_LOOKING
+            + (self.density(grid, patches) / CLEAR_DENSITY).clamp(-MOST_BY_DENSITY, MOST_BY_DENSITY);
+        let is_guess = told.abs() < GUESS;
+        if is_guess && decisions.len() == 1 {
+            return Ok(());
+        }
+        let is_from_behind = if is_guess { is_below(turned.normal) } else { told < 0.0 };
+        let told = match is_guess {
+            true => (Side::Convention, 0.0),
+            false => (Side::View, MOST_CONFIDENCE * told.abs() / (1.0 + told.abs())),
+        };
         for (patch, (flipped, &component)) in patches.all.iter().zip(signs.flipped.iter_mut().zip(&signs.component)) {
-            *flipped ^= turned.flipped[component as usize];
-            *flipped ^= turned.away <= MISTAKES && self.cosine(patch, *flipped) < CLEARLY_AWAY;
+            let Some(seen) = &turned.components[component as usize] else { continue };
+            *flipped ^= seen.is_flipped;
+            let may_err = turned.away <= MISTAKES && seen.away <= MISTAKES;
+            *flipped ^= may_err && self.cosine(patch, *flipped) < CLEARLY_AWAY;
             *flipped ^= is_from_behind;
         }
-        for decision in decisions {
-            let component = &mut decision.component;
-            (component.side, component.confidence) =
-                if is_clear { (Side::View, confidence) } else { (Side::Convention, 0.0) };
+        for (decision, _) in decisions.iter_mut().zip(&turned.components).filter(|(_, seen)| seen.is_some()) {
+            (decision.component.side, decision.component.confidence) = told;
         }
         Ok(())
     }
 
-    /// Which components to turn so that as much as can be faces along the view.
+    /// How components are to be turned so that as much as can be faces along the view.
     fn turned(&self, patches: &Patches, signs: &Signs) -> Result<Turned, Error> {
-        let mut balances = filled(0.0, signs.components, WHAT)?;
-        for (patch, (&flipped, &component)) in each(patches, signs) {
-            let side = if self.cosine(patch, flipped) < 0.0 { -1.0 } else { 1.0 };
-            balances[component as usize] += side * f64::from(patch.points);
-        }
-        let mut flipped = filled(false, signs.components, WHAT)?;
-        flipped.iter_mut().zip(&balances).for_each(|(flipped, &balance)| *flipped = balance < 0.0);
-        let mut turned = Turned { flipped, away: 0.0, missed: DVec3::ZERO, normal: DVec3::ZERO };
-        let mut all = 0.0;
-        for (patch, (&flipped, &component)) in each(patches, signs) {
-            let flipped = flipped ^ turned.flipped[component as usize];
-            turned.normal += weighed(patch, flipped);
-            all += f64::from(patch.points);
+        // For each its points, and those of them that face away.
+        let mut counts = filled((0.0, 0.0), signs.components, WHAT)?;
+        for (patch, flipped, component) in each(patches, signs) {
+            let (all, away) = &mut counts[component];
+            *all += f64::from(patch.points);
             if self.cosine(patch, flipped) < 0.0 {
-                turned.away += f64::from(patch.points);
-                turned.missed += weighed(patch, flipped);
+                *away += f64::from(patch.points);
             }
         }
-        turned.away /= all;
-        turned.missed /= all;
-        Ok(turned)
+        let mut components = Vec::new();
+        reserve(&mut components, signs.components, WHAT)?;
+        components.extend(counts.into_iter().map(|(all, away)| {
+            let (is_flipped, away) = (2.0 * away > all, away.min(all - away) / all);
+            (away <= MIXED).then_some(Seen { is_flipped, away })
+        }));
+        let (mut all, mut seen, mut away, mut missed, mut normal) = (0.0, 0.0, 0.0, DVec3::ZERO, DVec3::ZERO);
+        for (patch, flipped, component) in each(patches, signs) {
+            let points = f64::from(patch.points);
+            all += points;
+            let Some(Seen { is_flipped, .. }) = components[component] else { continue };
+            let weighed = weighed(patch, flipped ^ is_flipped);
+            seen += points;
+            normal += weighed;
+            if self.cosine(patch, flipped ^ is_flipped) < 0.0 {
+                away += points;
+                missed += weighed;
+            }
+        }
+        let mixed = 1.0 - seen / all;
+        Ok(Turned { components, mixed, away: away / seen.max(1.0), missed: missed / seen.max(1.0), normal })
     }
 
     fn cosine(&self, patch: &Patch, is_flipped: bool) -> f32 {
@@ -167,9 +193,9 @@ impl View {
     }
 
     /// All patches, and where they are, in edges.
-    fn places<'a>(&self, grid: &'a Grid, patches: &'a Patches) -> impl Iterator<Item = (&'a Patch, Vec3)> {
-        let corner = |brick: usize| (BRICK * grid.bricks.places[brick]).as_vec3();
-        patches.placed(grid).map(move |(patch, brick, local)| (&patches.all[patch], corner(brick) + local))
+    fn places<'a>(&self, grid: &'a Grid, patches: &'a Patches) -> impl Iterator<Item = (&'a Patch, DVec3)> {
+        let corner = |brick: usize| (BRICK * grid.bricks.places[brick]).as_dvec3();
+        patches.placed(grid).map(move |(patch, brick, local)| (&patches.all[patch], corner(brick) + local.as_dvec3()))
     }
 
     /// The share of the points that lie behind others.
@@ -177,17 +203,17 @@ impl View {
         // Sheared along the axis next to it, so that mirrored points fall into mirrored squares.
         let along = self.towards.abs().max_position();
         let (across, up) = ((along + 1) % 3, (along + 2) % 3);
-        let forward = self.towards[along];
+        let shear = self.towards.as_dvec3() / f64::from(self.towards[along]);
         let mut spots = Vec::new();
         reserve(&mut spots, patches.all.len(), WHAT)?;
         spots.extend(self.places(grid, patches).map(|(patch, place)| {
-            let square = |axis: usize| (place[axis] - place[along] / forward * self.towards[axis]).floor() as i32;
+            let square = |axis: usize| (place[axis] - place[along] * shear[axis]).floor() as i64;
             let cosine = self.cosine(patch, false);
             let rise = self.towards - patch.normal / cosine.abs().max(STEEPEST).copysign(cosine);
             Spot {
                 square: (square(across), square(up)),
-                depth: self.towards.dot(place),
-                slope: rise[across].hypot(rise[up]),
+                depth: self.towards.as_dvec3().dot(place),
+                slope: f64::from(rise[across] * rise[across] + rise[up] * rise[up]).sqrt(),
                 points: patch.points,
             }
         }));
@@ -202,7 +228,8 @@ impl View {
         for spots in spots.chunk_by(|one, next| one.square == next.square) {
             let front = &spots[0];
             for spot in spots {
-                let least = BEHIND + DEVIATIONS * noise + std::f32::consts::SQRT_2 * front.slope.max(spot.slope);
+                let steeper = std::f64::consts::SQRT_2 * front.slope.max(spot.slope);
+                let least = BEHIND + DEVIATIONS * f64::from(noise) + steeper;
                 all += f64::from(spot.points);
                 if front.depth - spot.depth > least {
                     hidden += f64::from(spot.points);
@@ -212,22 +239,20 @@ impl View {
         Ok(hidden / all)
     }
 
-    /// How much denser what is nearer is, in standard errors: the logarithm of the points of a patch by how near it is, and by
-    /// the logarithm of its cosine, because a scanner sees fewer points of what is slanted.
+    /// How much denser what is nearer by a standard deviation is, as a logarithm, or 0 if that may be chance: of the points of a
+    /// patch by how near it is, and by the logarithm of its cosine, because a scanner sees fewer points of what is slanted.
     fn density(&self, grid: &Grid, patches: &Patches) -> f64 {
-        let told = || {
+        let samples = || {
             self.places(grid, patches).filter(|(patch, _)| !patch.has_rival).filter_map(|(patch, place)| {
                 let cosine = self.cosine(patch, false).abs();
-                (cosine >= FACING).then(|| {
-                    let nearness = f64::from(self.towards.dot(place));
-                    DVec3::new(f64::from(patch.points).ln(), nearness, f64::from(cosine).ln())
-                })
+                let nearness = self.towards.as_dvec3().dot(place);
+                (cosine >= FACING).then(|| DVec3::new(log2(patch.points.into()), nearness, log2(cosine.into())))
             })
         };
-        let (count, sum) = told().fold((0.0, DVec3::ZERO), |(count, sum), one| (count + 1.0, sum + one));
+        let (count, sum) = samples().fold((0.0, DVec3::ZERO), |(count, sum), one| (count + 1.0, sum + one));
         let mean = sum / count;
         let [mut by_points, mut by_nearness, mut by_cosine] = [DVec3::ZERO; 3];
-        for one in told() {
+        for one in samples() {
             let off = one - mean;
             by_points += off.x * off;
             by_nearness += off.y * off;
@@ -240,34 +265,53 @@ impl View {
         let by_slant = (by_points.z * by_nearness.y - by_points.y * by_nearness.z) / determinant;
         let rest = (by_points.x - slope * by_points.y - by_slant * by_points.z) / count;
         let error = (rest * by_cosine.z / determinant).sqrt();
-        // Nothing is told where all are equally near, or all equally many.
-        let told = slope / error;
-        let is_deep = by_nearness.y >= LEAST_DEPTH * LEAST_DEPTH * count;
-        if count >= LEAST_DENSITIES && is_deep && told.is_finite() { told } else { 0.0 }
+        // What deviates in depth and not for being slanted.
+        let depth = (determinant / (by_cosine.z * count)).sqrt();
+        let is_told = count >= LEAST_DENSITIES && depth >= LEAST_DEPTH && slope.abs() >= CHANCE * error;
+        if is_told && slope.is_finite() { std::f64::consts::LN_2 * slope * depth } else { 0.0 }
     }
 }
 
 /// Surfaces turned to one side.
 struct Turned {
-    /// For each component whether it was.
-    flipped: Vec<bool>,
-    /// The share that still faces away.
+    /// For each component how it faces that side; `None` for what was not seen from one side.
+    components: Vec<Option<Seen>>,
+    /// The share of those.
+    mixed: f64,
+    /// The share of the others that still faces away.
     away: f64,
-    /// The mean of the normals of that.
+    /// The sum of the normals of that, for each point of them.
     missed: DVec3,
-    /// The sum of all normals.
+    /// The sum of all their normals.
     normal: DVec3,
 }
 
-/// The mean volume behind the components, less where it lies before them.
+/// A component that faces a side.
+#[derive(Clone, Copy)]
+struct Seen {
+    /// Once it is flipped.
+    is_flipped: bool,
+    /// But for this share.
+    away: f64,
+}
+
+impl Turned {
+    /// Whether a component was turned.
+    fn is_flipped(&self, component: usize) -> bool {
+        self.components[component].is_some_and(|seen| seen.is_flipped)
+    }
+}
+
+/// The mean volume behind what was seen from one side, less where it lies before that.
 fn bulge(decisions: &[Decision], turned: &Turned) -> f64 {
     let (mut sum, mut all) = (0.0, 0.0);
-    for (decision, &flipped) in decisions.iter().zip(&turned.flipped) {
+    for (decision, seen) in decisions.iter().zip(&turned.components) {
+        let Some(seen) = seen else { continue };
         let points = decision.component.points as f64;
-        sum += points * signed(flipped, decision.volume);
+        sum += points * signed(seen.is_flipped, decision.volume);
         all += points;
     }
-    sum / all
+    if all > 0.0 { sum / all } else { 0.0 }
 }
 
 /// How much, for each patch, surfaces look from their front at the front of others, less what they do so from their back at
@@ -279,7 +323,7 @@ fn looking(looks: Option<&Looks>, signs: &Signs, decisions: &[Decision], turned:
     for look in &looks.all {
         let [from, to] = [look.from, look.to].map(|patch| patch as usize);
         let component = |patch: usize| signs.component[patch] as usize;
-        let flipped = |patch: usize| signs.flipped[patch] ^ turned.flipped[component(patch)];
+        let flipped = |patch: usize| signs.flipped[patch] ^ turned.is_flipped(component(patch));
         let vote = signed(flipped(to), look.along);
         if component(from) == component(to) {
             if component(to) == 0 {
@@ -301,17 +345,18 @@ fn looking(looks: Option<&Looks>, signs: &Signs, decisions: &[Decision], turned:
 /// A patch as the scanner sees it.
 struct Spot {
     /// Where it is across the view, in edges.
-    square: (i32, i32),
+    square: (i64, i64),
     /// How near it is, in edges.
-    depth: f32,
+    depth: f64,
     /// How much nearer or farther its plane is an edge away.
-    slope: f32,
+    slope: f64,
     points: u32,
 }
 
 /// The patches, whether each is flipped, and its component.
-fn each<'a>(patches: &'a Patches, signs: &'a Signs) -> impl Iterator<Item = (&'a Patch, (&'a bool, &'a u32))> {
-    patches.all.iter().zip(signs.flipped.iter().zip(&signs.component))
+fn each<'a>(patches: &'a Patches, signs: &'a Signs) -> impl Iterator<Item = (&'a Patch, bool, usize)> {
+    let signs = signs.flipped.iter().zip(&signs.component);
+    patches.all.iter().zip(signs).map(|(patch, (&flipped, &component))| (patch, flipped, component as usize))
 }
 
 /// The normal of a patch, as long as it has points.

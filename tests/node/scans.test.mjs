@@ -46,6 +46,33 @@ if (!existsSync(data)) {
     }
   });
 
+  describe('what one scanner saw faces it', () => {
+    let estimator;
+    before(async () => {
+      const api = await load('bilinormal');
+      estimator = await api.createEstimator();
+    });
+    after(() => estimator.dispose());
+    // Where no direction is given, the file has normals towards the scanner.
+    for (const [name, direction] of [
+      ['stanford_bun000_raw.ply', [0, 0, 1]],
+      ['meshlab_range_face000.ply', [0, 0, 1]],
+      ['cilantro_frame_1.ply'],
+    ]) {
+      test(name, async () => {
+        const cloud = await estimator.readPointCloud(pathToFileURL(join(data, 'scans', name)));
+        const { normals, report } = await estimator.estimateNormals(cloud.positions, { orient: 'consistent' });
+        let right = 0;
+        for (let i = 0; i < normals.length; i += 3) {
+          const towards = direction ?? [...cloud.normals.subarray(i, i + 3)];
+          if (towards.reduce((sum, value, j) => sum + value * normals[i + j], 0) > 0) right++;
+        }
+        assert.ok(right > 0.998 * cloud.count, `${right} of ${cloud.count}`);
+        assert.equal(report.components.largest[0].side, 'view');
+      });
+    }
+  });
+
   describe('every odd file ends in a result or a clear error', () => {
     let api;
     let estimator;
