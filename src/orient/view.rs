@@ -192,12 +192,6 @@ impl View {
         signed(is_flipped, patch.normal).dot(self.towards)
     }
 
-    /// All patches, and where they are, in edges.
-    fn places<'a>(&self, grid: &'a Grid, patches: &'a Patches) -> impl Iterator<Item = (&'a Patch, DVec3)> {
-        let corner = |brick: usize| (BRICK * grid.bricks.places[brick]).as_dvec3();
-        patches.placed(grid).map(move |(patch, brick, local)| (&patches.all[patch], corner(brick) + local.as_dvec3()))
-    }
-
     /// The share of the points that lie behind others.
     fn hidden(&self, grid: &Grid, patches: &Patches, noise: f32) -> Result<f64, Error> {
         // Sheared along the axis next to it, so that mirrored points fall into mirrored squares.
@@ -206,7 +200,7 @@ impl View {
         let shear = self.towards.as_dvec3() / f64::from(self.towards[along]);
         let mut spots = Vec::new();
         reserve(&mut spots, patches.all.len(), WHAT)?;
-        spots.extend(self.places(grid, patches).map(|(patch, place)| {
+        spots.extend(places(grid, patches).map(|(patch, place)| {
             let square = |axis: usize| (place[axis] - place[along] * shear[axis]).floor() as i64;
             let cosine = self.cosine(patch, false);
             let rise = self.towards - patch.normal / cosine.abs().max(STEEPEST).copysign(cosine);
@@ -243,7 +237,7 @@ impl View {
     /// patch by how near it is, and by the logarithm of its cosine, because a scanner sees fewer points of what is slanted.
     fn density(&self, grid: &Grid, patches: &Patches) -> f64 {
         let samples = || {
-            self.places(grid, patches).filter(|(patch, _)| !patch.has_rival).filter_map(|(patch, place)| {
+            places(grid, patches).filter(|(patch, _)| !patch.has_rival).filter_map(|(patch, place)| {
                 let cosine = self.cosine(patch, false).abs();
                 let nearness = self.towards.as_dvec3().dot(place);
                 (cosine >= FACING).then(|| DVec3::new(log2(patch.points.into()), nearness, log2(cosine.into())))
@@ -357,6 +351,12 @@ struct Spot {
 fn each<'a>(patches: &'a Patches, signs: &'a Signs) -> impl Iterator<Item = (&'a Patch, bool, usize)> {
     let signs = signs.flipped.iter().zip(&signs.component);
     patches.all.iter().zip(signs).map(|(patch, (&flipped, &component))| (patch, flipped, component as usize))
+}
+
+/// The patches, and where they are, in edges.
+fn places<'a>(grid: &'a Grid, patches: &'a Patches) -> impl Iterator<Item = (&'a Patch, DVec3)> {
+    let corner = |brick: usize| (BRICK * grid.bricks.places[brick]).as_dvec3();
+    patches.placed(grid).map(move |(patch, brick, local)| (&patches.all[patch], corner(brick) + local.as_dvec3()))
 }
 
 /// The normal of a patch, as long as it has points.
