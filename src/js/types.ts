@@ -47,9 +47,9 @@ export interface EstimateOptions {
    * each connected surface, outwards if it is closed, else towards what stands before it; if nothing does, away from its
    * middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal; what one scanner saw from one side faces it. `'outward'`:
    * the same for closed surfaces; of others every part is turned to what it sees of the open, for heaps of parts and objects
-   * with holes. Both also average normals,
-   * with `cell: 'auto'`, where surfaces face apart within the noise, as at edges and on rods, and give the narrow sides of
-   * ribs and grooves without noise the planes that their points lie on: elsewhere only signs change.
+   * with holes. Both also average normals, with `cell: 'auto'`, where surfaces face apart within the noise, as at edges and on
+   * rods, and give the narrow sides of ribs and grooves without noise the planes that their points lie on: elsewhere only
+   * signs change.
    * `viewpoint`: towards a position, in the coordinates of `positions`. `up`: towards a direction of any length but 0, for
    * terrain. Both are arrays of three finite numbers.
    */
@@ -127,10 +127,10 @@ export interface Report {
    * from the middle of what is open or hidden, or, of what is long and thin, from the middles of its pieces; `'sight'`, because
    * other surfaces, or its own parts, stand before that side; `'view'`, because the cloud is what a scanner saw from that side
    * (both by `'consistent'` only); `'convention'`, because it is open and flat, so that nothing tells: the mean normal has
-   * `x + 2y + 4z >= 0`, where all was seen from one side that of all surfaces. `confidence`, from 0, a guess, to 1, which is sure: of all that is seen of the open, how much more is
-   * seen from one side; for what sees nothing of it how much volume there is, of that of a sphere, or of its pieces; by sight,
-   * half of how much more looks at that side, of all that does; by view, up to a half. Only with `orient: 'consistent'` and
-   * `'outward'`.
+   * `x + 2y + 4z >= 0`, where all was seen from one side that of all surfaces. `confidence`, from 0, a guess, to 1, which is
+   * sure: of all that is seen of the open, how much more is seen from one side; for what sees nothing of it how much volume
+   * there is, of that of a sphere, or of its pieces; by sight, half of how much more looks at that side, of all that does; by
+   * view, up to a half. Only with `orient: 'consistent'` and `'outward'`.
    */
   components?: {
     count: number;

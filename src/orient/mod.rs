@@ -117,10 +117,10 @@ fn surfaces(
     let sights = air::sights(grid, &patches, points.len(), &stage.part(0.5..0.55))?;
     let links = Links::of(grid, &patches, *noise, &stage.part(0.55..0.7))?;
     let groups = Groups::of(links, &sights, &patches, &stage.part(0.7..0.85))?;
-    let choice = stage.part(0.85..0.9);
+    let choosing = stage.part(0.85..0.9);
     let (mut signs, looks, view) = match options.orient {
-        Orient::Outward => (Signs::outward(groups, &choice)?, None, None),
-        _ => consistent(groups, grid, &patches, *noise, &sights, &choice)?,
+        Orient::Outward => (Signs::outward(groups, &choosing)?, None, None),
+        _ => consistent(groups, grid, &patches, *noise, &sights, &choosing)?,
     };
     let mut decisions = decide(grid, &patches, &sights, &mut signs)?;
     if let Some(view) = view {

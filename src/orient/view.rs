@@ -80,7 +80,8 @@ pub(super) struct View {
 }
 
 impl View {
-    /// That of a cloud, if it is one. Up to twice [`ROUNDS`] passes over the patches, two where it is closed, and a sort.
+    /// That of a cloud, if it is one. Two passes over the patches for each round, of which there is one where the cloud is closed,
+    /// and a sort.
     pub fn of(grid: &Grid, patches: &Patches, noise: f32, signs: &Signs, stage: &Stage) -> Result<Option<Self>, Error> {
         if patches.all.len() < LEAST_PATCHES as usize {
             return Ok(None);
