@@ -16,6 +16,7 @@ use crate::normals::{Normals, SHORT, Writer};
 use crate::parallel::Filling;
 use crate::progress::Stage;
 use glam::{Vec3, Vec4};
+use std::cell::LazyCell;
 use std::f32::consts::FRAC_1_SQRT_2;
 
 /// How far a surface speaks, in edges: the deviation of a normal distribution.
@@ -181,7 +182,7 @@ impl<'a> Task<'a> {
             let near = self.around.near(&level.grid, brick, bit, 2);
             is_edge = has_many && self.faces.find(level, bit, near, chosen);
             if !is_edge {
-                let noise = || quartile(near.iter().map(|near| chosen[near.cube as usize].flat_noise));
+                let noise = LazyCell::new(|| quartile(near.iter().map(|near| chosen[near.cube as usize].flat_noise)));
                 if can_divide {
                     let (mut planes, mut showing) = (0, 0);
                     for near in near {
@@ -195,13 +196,13 @@ impl<'a> Task<'a> {
                         division > 0
                             && near.len() >= SHEET
                             && 2 * showing >= near.len()
-                            && (WIDE..f32::INFINITY).contains(&noise())
+                            && (WIDE..f32::INFINITY).contains(&*noise)
                     };
                     if IN_NOISE * planes < near.len() && !is_wide() {
                         return Role::Wanted;
                     }
                 }
-                self.ballot.invite(near, chosen, noise());
+                self.ballot.invite(near, chosen, *noise);
             }
         }
         let placed = level.points(cube);
