@@ -52,6 +52,9 @@ impl<'a> Progress<'a> {
     }
 }
 
+/// Milliseconds of a batch of tasks that may be twice as long: then the observer hears some twenty times a second.
+const BRIEF: f64 = 20.0;
+
 /// A part of a call, which tells of itself as a part of the whole.
 pub(crate) struct Stage<'a> {
     progress: &'a Progress<'a>,
@@ -61,21 +64,24 @@ pub(crate) struct Stage<'a> {
 
 impl Stage<'_> {
     /// Runs `work` for each number below `count`, in parallel. Between batches it tells the observer and lets it stop
-    /// the call: with tasks of some thousand points, some twenty times a second. Threads wait for each other
-    /// at the end of a batch, so smaller ones cost time.
+    /// the call. Threads wait for each other at the end of a batch, and then sleep and have to be woken, so batches grow
+    /// as long as they are brief.
     pub fn run(&self, count: usize, work: &(dyn Fn(usize) + Sync)) -> Result<(), Error> {
         self.run_in(64, count, work)
     }
 
     /// The same for long tasks: `each` of them a thread between two looks at the observer.
     pub fn run_in(&self, each: usize, count: usize, work: &(dyn Fn(usize) + Sync)) -> Result<(), Error> {
-        let batch = each * parallel::threads();
+        let mut batch = each * parallel::threads();
         let mut done = 0;
         while done < count {
             self.tell(done as f64 / count as f64)?;
-            let length = batch.min(count - done);
+            let (length, begun) = (batch.min(count - done), self.progress.milliseconds());
             parallel::each(length, &|i| work(done + i));
             done += length;
+            if self.progress.milliseconds() - begun < BRIEF {
+                batch *= 2;
+            }
         }
         self.tell(1.0)
     }
