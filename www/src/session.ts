@@ -1,4 +1,4 @@
-// What a person can have done, as one flow: file -> readPointCloud -> viewer.show -> estimateNormals ->
+// What a person can have done, as one flow: file -> readPointCloud -> estimateNormals, meanwhile viewer.show ->
 // viewer.setNormals -> report. One job runs at a time; a new one cancels it. Curvature is computed while it is shown.
 import { estimateNormals, readPointCloud, writePly, type EstimateOptions } from 'bilinormal';
 import { scannerOf } from '../../src/js/scanner';
@@ -89,7 +89,16 @@ export function createSession(store: Store, viewer: Viewer): Session {
     store.set({ job: undefined, shading: shading === 'curvature' && !scan?.hasCurvature ? 'shaded' : shading });
   }
 
+  /** Reads a file, shows its points, and shades them. */
   async function show(file: File, step: Step): Promise<void> {
+    const draw = await read(file, step);
+    // In a task of its own: by then the worker has begun.
+    const drawn = new Promise((resolve) => setTimeout(resolve)).then(draw);
+    await Promise.all([shade(step), drawn]);
+  }
+
+  /** Takes the cloud of a file for the one on the screen; answers what draws it. */
+  async function read(file: File, step: Step): Promise<() => void> {
     const started = performance.now();
     const cloud = await readPointCloud(file, { signal: step.signal, onProgress: step.begin(`Reading ${file.name}`) });
     step.signal.throwIfAborted();
@@ -103,7 +112,6 @@ export function createSession(store: Store, viewer: Viewer): Session {
     // Gaussian splats bring zeros.
     const normals = cloud.normals?.some((value) => value !== 0) ? cloud.normals : undefined;
     shown = { file, positions: cloud.positions, normals };
-    viewer.show(cloud, bounds, up);
     const scan = {
       name: file.name,
       points: cloud.count,
@@ -131,6 +139,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
       cellText: '',
       orientKind: isPast ? 'consistent' : orientKind,
     });
+    return () => viewer.show(cloud, bounds, up);
   }
 
   async function shade(step: Step): Promise<void> {
@@ -211,17 +220,13 @@ export function createSession(store: Store, viewer: Viewer): Session {
         store.set({ error: `${ONLY_PLY}; ${file.name} is none, so the work goes on` });
         return;
       }
-      await run(file.name, async (step) => {
-        await show(file, step);
-        await shade(step);
-      });
+      await run(file.name, (step) => show(file, step));
     },
 
     openSample: () =>
       run('The sample', async (step) => {
         step.begin('Making the sample');
         await show(await makeSample(step.signal), step);
-        await shade(step);
       }),
 
     estimate: () => run('Computing normals', shade),
