@@ -539,6 +539,70 @@ fn what_is_nearer_to_a_scanner_is_denser() {
     }
 }
 
+/// A closed room of 4 x 3 x 2.4 with a ball and a box in it: the first place on a ray from inside, and the normal there.
+fn first_in_a_room(from: [f64; 3], along: [f64; 3]) -> ([f64; 3], [f64; 3]) {
+    let mut first = (f64::INFINITY, [0.0; 3]);
+    let mut meet = |depth: f64, normal: [f64; 3]| {
+        if depth > 0.0 && depth < first.0 {
+            first = (depth, normal);
+        }
+    };
+    let across = |axis: usize| [0, 1, 2].map(|other| if other == axis { -along[axis].signum() } else { 0.0 });
+    let at = |axis: usize, wall: f64| (wall - from[axis]) / along[axis];
+    for (axis, wall) in [2.0f64, 1.5, 1.2].into_iter().enumerate() {
+        meet(at(axis, wall.copysign(along[axis])), across(axis));
+    }
+    let (low, high) = ([-1.6, -1.2, -1.2], [-0.6, -0.4, -0.4]);
+    let ends = [0, 1, 2].map(|axis| [at(axis, low[axis]), at(axis, high[axis])]);
+    let entries = ends.map(|[a, b]| a.min(b));
+    let entry = entries.into_iter().fold(f64::MIN, f64::max);
+    if entry < ends.iter().map(|[a, b]| a.max(*b)).fold(f64::MAX, f64::min) {
+        meet(entry, across(entries.iter().position(|&one| one == entry).unwrap()));
+    }
+    let (middle, radius) = ([0.9, 0.6, -0.7], 0.4);
+    let to = [0, 1, 2].map(|axis| middle[axis] - from[axis]);
+    let closest: f64 = (0..3).map(|axis| to[axis] * along[axis]).sum();
+    let square = radius * radius - to.iter().map(|c| c * c).sum::<f64>() + closest * closest;
+    if square > 0.0 {
+        let depth = closest - square.sqrt();
+        meet(depth, [0, 1, 2].map(|axis| (depth * along[axis] - to[axis]) / radius));
+    }
+    let (depth, normal) = first;
+    ([0, 1, 2].map(|axis| from[axis] + depth * along[axis]), normal)
+}
+
+/// Nothing but its densities tells a room from inside from a box from outside.
+#[test]
+fn what_was_scanned_from_amid_it_faces_the_scanner() {
+    for (seed, from) in [(81, [0.2, 0.1, 0.3]), (82, [1.2, -0.9, 0.5]), (83, [-0.4, 0.9, -0.2])] {
+        for count in [10_000, 80_000] {
+            for noise in [0.0, 0.001] {
+                let mut random = Random(seed);
+                let samples = (0..count).map(|_| first_in_a_room(from, random.direction()));
+                let cloud = Cloud::of(samples.map(|(p, n)| (turn(p), turn(n)))).noisy(noise, 5);
+                let result = orient(&cloud.points, Orient::Consistent);
+                let right = share_right(&result.normals, &cloud.normals);
+                let about = format!("{from:?}, {count}, {noise}: {right}, {:?}", components(&result));
+                assert!(right > 0.999, "{about}");
+                assert!(
+                    components(&result).iter().all(|one| one.side == Side::View && one.confidence > 0.15),
+                    "{about}"
+                );
+            }
+        }
+    }
+    // Covered evenly it is a box.
+    let mut random = Random(84);
+    let cloud = Cloud::of((0..80_000).map(|_| {
+        let (axis, side) = ((3.0 * random.unit()) as usize, if random.unit() < 0.5 { 1.0 } else { -1.0 });
+        let place = [0, 1, 2].map(|other| [2.0, 1.5, 1.2][other] * if other == axis { side } else { random.signed() });
+        (turn(place), turn([0, 1, 2].map(|other| if other == axis { side } else { 0.0 })))
+    }));
+    let result = orient(&cloud.points, Orient::Consistent);
+    assert_eq!(components(&result)[0].side, Side::Air);
+    assert_eq!(share_right(&result.normals, &cloud.normals), 1.0);
+}
+
 /// A floor is seen from one side, and a ball over it from all.
 #[test]
 fn what_was_scanned_all_round_is_no_part_of_a_view() {

@@ -1,6 +1,7 @@
-// What laser scanners see of a corner of a room that is furnished: samplers as in shapes.mjs, normals towards the scanner.
+// What laser scanners see of a room that is furnished, or a corner of it: samplers as in shapes.mjs, normals towards the
+// scanner.
 
-/** The floor and two walls, all from 0 on, so far along each axis. */
+/** The floor and two walls, all from 0 on, so far along each axis; there a whole room ends with a ceiling and two more. */
 const ROOM = [4, 3.6, 2.4];
 
 /** A box without legs, one that stands on the floor, and two balls above it. */
@@ -20,21 +21,24 @@ const STATIONS = [
   [3.4, 0.5, 1.3],
 ];
 
-/** Points that the first `stations` scanners see, as many in every direction. */
-export const scene = (stations) => () => (random, out) => {
-  for (;;) {
-    const from = STATIONS[Math.floor(stations * random())];
-    const [height, a] = [2 * random() - 1, 2 * Math.PI * random()];
-    const ring = Math.sqrt(1 - height * height);
-    const hit = nearest(from, [ring * Math.cos(a), ring * Math.sin(a), height]);
-    if (!hit) continue;
-    out.set(hit);
-    return;
-  }
-};
+/** Points that the first `stations` scanners see, as many in every direction; `isWhole`: of the whole room. */
+export const scene =
+  (stations, isWhole = false) =>
+  () =>
+  (random, out) => {
+    for (;;) {
+      const from = STATIONS[Math.floor(stations * random())];
+      const [height, a] = [2 * random() - 1, 2 * Math.PI * random()];
+      const ring = Math.sqrt(1 - height * height);
+      const hit = nearest(from, [ring * Math.cos(a), ring * Math.sin(a), height], isWhole);
+      if (!hit) continue;
+      out.set(hit);
+      return;
+    }
+  };
 
-/** The first place on a ray, and the normal there; nothing where that is out of the room. */
-function nearest(from, along) {
+/** The first place on a ray, and the normal there; nothing where that is out of the room, unless it is whole. */
+function nearest(from, along, isWhole) {
   let first = { distance: Infinity, normal: [0, 0, 0] };
   const meet = (distance, normal) => {
     if (distance > 0 && distance < first.distance) first = { distance, normal };
@@ -43,6 +47,7 @@ function nearest(from, along) {
   const unit = (axis, sign) => axes.map((other) => (other === axis ? sign : 0));
   for (const axis of axes) {
     if (along[axis] < 0) meet(-from[axis] / along[axis], unit(axis, 1));
+    else if (isWhole) meet((ROOM[axis] - from[axis]) / along[axis], unit(axis, -1));
   }
   for (const { low, high } of BOXES) {
     const ends = axes.map((axis) => [low[axis], high[axis]].map((at) => (at - from[axis]) / along[axis]));
@@ -64,5 +69,5 @@ function nearest(from, along) {
     }
   }
   const place = axes.map((axis) => from[axis] + first.distance * along[axis]);
-  return axes.every((axis) => place[axis] < ROOM[axis]) ? [...place, ...first.normal] : undefined;
+  return isWhole || axes.every((axis) => place[axis] < ROOM[axis]) ? [...place, ...first.normal] : undefined;
 }

@@ -145,4 +145,5 @@ export const SHAPES = {
   star: { shape: star, noise: 'noise0.12' },
   scene: { shape: scene(3), kind: 'scene', noise: 'noise0.12' },
   view: { shape: scene(1), kind: 'scene', noise: 'noise0.12' },
+  hall: { shape: scene(1, true), kind: 'scene', noise: 'noise0.12' },
 };

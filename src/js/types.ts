@@ -45,7 +45,7 @@ export interface EstimateOptions {
   /**
    * How signs are chosen. Default `'none'`: `x + 2y + 4z >= 0`, deterministic and nothing more. `'consistent'`: one sign for
    * each connected surface, outwards if it is closed, else towards what stands before it; if nothing does, away from its
-   * middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal; what one scanner saw from one side faces it. `'outward'`:
+   * middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal; what one scanner saw from one place faces it. `'outward'`:
    * the same for closed surfaces; of others every part is turned to what it sees of the open, for heaps of parts and objects
    * with holes. Both also average normals, with `cell: 'auto'`, where surfaces face apart within the noise, as at edges and on
    * rods, and give the narrow sides of ribs and grooves without noise the planes that their points lie on: elsewhere only
@@ -126,11 +126,11 @@ export interface Report {
    * `side` tells by what: `'air'`, because the surface is closed, and one side sees much more of the open air; `'volume'`, away
    * from the middle of what is open or hidden, or, of what is long and thin, from the middles of its pieces; `'sight'`, because
    * other surfaces, or its own parts, stand before that side; `'view'`, because the cloud is what a scanner saw from that side
-   * (both by `'consistent'` only); `'convention'`, because it is open and flat, so that nothing tells: the mean normal has
+   * or from amid the surfaces (both by `'consistent'` only); `'convention'`, because it is open and flat, so that nothing tells: the mean normal has
    * `x + 2y + 4z >= 0`, where all was seen from one side that of all surfaces. `confidence`, from 0, a guess, to 1, which is
    * sure: of all that is seen of the open, how much more is seen from one side; for what sees nothing of it how much volume
    * there is, of that of a sphere, or of its pieces; by sight, half of how much more looks at that side, of all that does; by
-   * view, up to a half. Only with `orient: 'consistent'` and `'outward'`.
+   * view, up to a half, or from amid the surfaces how well their densities tell where it was. Only with `orient: 'consistent'` and `'outward'`.
    */
   components?: {
     count: number;

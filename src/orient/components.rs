@@ -38,7 +38,8 @@ pub struct Component {
     pub side: Side,
     /// How much more speaks for that side than for the other: 0 is a guess, 1 is sure. By the air of all that is seen of the
     /// open how much more is seen from one side; for what sees nothing of it how much volume there is, of that of a sphere, or
-    /// of its pieces; by sight, half of how much more looks at one side, of all that does; by view, up to a half.
+    /// of its pieces; by sight, half of how much more looks at one side, of all that does; by view, up to a half, or from amid the
+    /// surfaces how well their densities tell where the scanner was.
     pub confidence: f64,
 }
 
@@ -52,7 +53,7 @@ pub enum Side {
     Volume,
     /// What stands before it: it is looked at from one side.
     Sight,
-    /// The scanner: all of the cloud was seen from one side.
+    /// The scanner: all of the cloud was seen from one side, or from amid it.
     View,
     /// Nothing: the surface is open and flat. By convention `x + 2y + 4z >= 0` for its mean normal; where all was seen from one
     /// side for that of all.

@@ -4,7 +4,7 @@
 //! into patches ([`patches`]), a patch and those round it say whether their signs agree ([`links`]), which sides of a patch
 //! are open to the air says which way is out ([`air`]), and the signs are chosen that these agree with best ([`groups`]), of
 //! open surfaces also what their parts see of each other ([`looks`]). These then face what stands before them ([`facing`]), or the
-//! scanner, if it saw all from one side ([`view`]). In noise normals then become means of those about them ([`means`]).
+//! scanner, if it saw all from one side ([`view`]) or from amid them ([`station`], [`thinning`]). In noise normals then become means of those about them ([`means`]).
 
 mod air;
 mod components;
@@ -16,6 +16,8 @@ mod looks;
 mod means;
 mod patches;
 mod signs;
+mod station;
+mod thinning;
 mod view;
 
 pub use components::{Component, Components, Side};
@@ -37,6 +39,7 @@ use links::Links;
 use looks::Looks;
 use patches::{Members, Patches};
 use signs::{Choice, Signs};
+use station::Station;
 use view::View;
 
 /// What was found out about the surfaces of a cloud.
@@ -118,16 +121,19 @@ fn surfaces(
     let links = Links::of(grid, &patches, *noise, &stage.part(0.55..0.7))?;
     let groups = Groups::of(links, &sights, &patches, &stage.part(0.7..0.85))?;
     let choosing = stage.part(0.85..0.9);
-    let (mut signs, looks, view) = match options.orient {
+    let (mut signs, looks, scanner) = match options.orient {
         Orient::Outward => (Signs::outward(groups, &choosing)?, None, None),
         _ => consistent(groups, grid, &patches, *noise, &sights, &choosing)?,
     };
     let mut decisions = decide(grid, &patches, &sights, &mut signs)?;
-    if let Some(view) = view {
-        view.turn_to_the_scanner(grid, &patches, looks.as_ref(), &mut signs, &mut decisions)?;
-    } else if options.orient == Orient::Consistent {
-        let facing = stage.part(0.9..0.95);
-        facing::turn_to_what_looks(grid, &patches, &sights, looks, &mut signs, &mut decisions, &facing)?;
+    match scanner {
+        Some(Scanner::Amid(station)) => station.turn_to_it(grid, &patches, &mut signs, &mut decisions)?,
+        Some(Scanner::Beside(view)) => view.turn_to_it(grid, &patches, looks.as_ref(), &mut signs, &mut decisions)?,
+        None if options.orient == Orient::Consistent => {
+            let facing = stage.part(0.9..0.95);
+            facing::turn_to_what_looks(grid, &patches, &sights, looks, &mut signs, &mut decisions, &facing)?;
+        }
+        None => {}
     }
     let components = Components::of(&decisions)?;
     let last = stage.part(0.95..1.0);
@@ -139,9 +145,17 @@ fn surfaces(
     Ok(Surfaces { components, of_point })
 }
 
+/// Where the one scanner was that saw all.
+enum Scanner {
+    /// Among the surfaces.
+    Amid(Station),
+    /// To one side of them.
+    Beside(View),
+}
+
 /// Signs that trust no part of the open that may mislead: of what is not closed a share counts, beside what its patches see of
-/// each other; but not where all was seen from one side, because the hollow side of that looks at itself. Also these looks, if
-/// there is anything that is not closed, and the view, if it is one.
+/// each other; but not where all was seen from one place, because the hollow side of that looks at itself. Also these looks, if
+/// there is anything that is not closed, and the scanner, if there was one.
 fn consistent(
     groups: Groups,
     grid: &Grid,
@@ -149,18 +163,21 @@ fn consistent(
     noise: f32,
     sights: &Sights,
     stage: &Stage,
-) -> Result<(Signs, Option<Looks>, Option<View>), Error> {
+) -> Result<(Signs, Option<Looks>, Option<Scanner>), Error> {
     let mut choice = Choice::of(groups, sights, &stage.part(0.0..0.3))?;
     let mut looks = None;
     if !choice.is_all_closed() {
         looks = Some(Looks::from_the_open(grid, patches, sights)?);
         choice.be_cautious(None, sights, &stage.part(0.3..0.5))?;
     }
-    let view = View::of(grid, patches, noise, choice.signs(), &stage.part(0.5..0.6))?;
-    if looks.is_some() && view.is_none() {
+    let scanner = match Station::of(grid, patches, choice.signs())? {
+        Some(station) => Some(Scanner::Amid(station)),
+        None => View::of(grid, patches, noise, choice.signs(), &stage.part(0.5..0.6))?.map(Scanner::Beside),
+    };
+    if looks.is_some() && scanner.is_none() {
         choice.be_cautious(looks.as_ref(), sights, &stage.part(0.6..1.0))?;
     }
-    Ok((choice.into_signs(), looks, view))
+    Ok((choice.into_signs(), looks, scanner))
 }
 
 /// Gives every point the sign of its patch, and tells the component of each if asked to.

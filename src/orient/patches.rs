@@ -2,12 +2,12 @@
 
 use crate::error::Error;
 use crate::grid::{Grid, Placed};
-use crate::lattice::cube_centre;
+use crate::lattice::{BRICK, cube_centre};
 use crate::lists::{concatenated, grow, reserve, starts};
 use crate::order::sort_few;
 use crate::parallel::Filling;
 use crate::progress::Stage;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::mem::MaybeUninit;
 use std::ops::{Neg, Range};
 
@@ -189,6 +189,12 @@ impl Patches {
             let centre = cube_centre(bit);
             self.of_cube(cube).map(move |patch| (patch, brick, centre + self.all[patch].centre))
         })
+    }
+
+    /// All patches, and where they are, in edges.
+    pub fn places<'a>(&'a self, grid: &'a Grid) -> impl Iterator<Item = (&'a Patch, DVec3)> + 'a {
+        let corner = |brick: usize| (BRICK * grid.bricks.places[brick]).as_dvec3();
+        self.placed(grid).map(move |(patch, brick, local)| (&self.all[patch], corner(brick) + local.as_dvec3()))
     }
 }
 

@@ -4,9 +4,9 @@ use super::components::{Decision, Side, is_below};
 use super::looks::{Looks, Votes};
 use super::patches::{Patch, Patches, signed};
 use super::signs::{LEAST_PATCHES, Signs};
+use super::thinning::Thinning;
 use crate::error::Error;
 use crate::grid::Grid;
-use crate::lattice::BRICK;
 use crate::lists::{filled, reserve};
 use crate::power::log2;
 use crate::progress::Stage;
@@ -121,7 +121,7 @@ impl View {
     /// it; what looks at another surface stands before it; and of what is twice as far a scanner with rays in all directions,
     /// or a camera, sees a quarter as many points. Where nothing tells, one surface stays as it is, and of more the mean of all
     /// normals is turned by convention.
-    pub fn turn_to_the_scanner(
+    pub fn turn_to_it(
         &self,
         grid: &Grid,
         patches: &Patches,
@@ -201,7 +201,7 @@ impl View {
         let shear = self.towards.as_dvec3() / f64::from(self.towards[along]);
         let mut spots = Vec::new();
         reserve(&mut spots, patches.all.len(), WHAT)?;
-        spots.extend(places(grid, patches).map(|(patch, place)| {
+        spots.extend(patches.places(grid).map(|(patch, place)| {
             let square = |axis: usize| (place[axis] - place[along] * shear[axis]).floor() as i64;
             let cosine = self.cosine(patch, false);
             let rise = self.towards - patch.normal / cosine.abs().max(STEEPEST).copysign(cosine);
@@ -238,32 +238,15 @@ impl View {
     /// patch by how near it is, and by the logarithm of its cosine, because a scanner sees fewer points of what is slanted.
     fn density(&self, grid: &Grid, patches: &Patches) -> f64 {
         let samples = || {
-            places(grid, patches).filter(|(patch, _)| !patch.has_rival).filter_map(|(patch, place)| {
+            patches.places(grid).filter(|(patch, _)| !patch.has_rival).filter_map(|(patch, place)| {
                 let cosine = self.cosine(patch, false).abs();
                 let nearness = self.towards.as_dvec3().dot(place);
                 (cosine >= FACING).then(|| DVec3::new(log2(patch.points.into()), nearness, log2(cosine.into())))
             })
         };
-        let (count, sum) = samples().fold((0.0, DVec3::ZERO), |(count, sum), one| (count + 1.0, sum + one));
-        let mean = sum / count;
-        let [mut by_points, mut by_nearness, mut by_cosine] = [DVec3::ZERO; 3];
-        for one in samples() {
-            let off = one - mean;
-            by_points += off.x * off;
-            by_nearness += off.y * off;
-            by_cosine += off.z * off;
-        }
-        // Where all is slanted alike, that explains nothing.
-        by_cosine.z += 1e-6 * count;
-        let determinant = by_nearness.y * by_cosine.z - by_nearness.z * by_nearness.z;
-        let slope = (by_points.y * by_cosine.z - by_points.z * by_nearness.z) / determinant;
-        let by_slant = (by_points.z * by_nearness.y - by_points.y * by_nearness.z) / determinant;
-        let rest = (by_points.x - slope * by_points.y - by_slant * by_points.z) / count;
-        let error = (rest * by_cosine.z / determinant).sqrt();
-        // What deviates in depth and not for being slanted.
-        let depth = (determinant / (by_cosine.z * count)).sqrt();
-        let is_told = count >= LEAST_DENSITIES && depth >= LEAST_DEPTH && slope.abs() >= CHANCE * error;
-        if is_told && slope.is_finite() { std::f64::consts::LN_2 * slope * depth } else { 0.0 }
+        let Thinning { count, near, error, depth, .. } = Thinning::of(samples);
+        let is_told = count >= LEAST_DENSITIES && depth >= LEAST_DEPTH && near.abs() >= CHANCE * error;
+        if is_told && near.is_finite() { std::f64::consts::LN_2 * near * depth } else { 0.0 }
     }
 }
 
@@ -352,12 +335,6 @@ struct Spot {
 fn each<'a>(patches: &'a Patches, signs: &'a Signs) -> impl Iterator<Item = (&'a Patch, bool, usize)> {
     let signs = signs.flipped.iter().zip(&signs.component);
     patches.all.iter().zip(signs).map(|(patch, (&flipped, &component))| (patch, flipped, component as usize))
-}
-
-/// The patches, and where they are, in edges.
-fn places<'a>(grid: &'a Grid, patches: &'a Patches) -> impl Iterator<Item = (&'a Patch, DVec3)> {
-    let corner = |brick: usize| (BRICK * grid.bricks.places[brick]).as_dvec3();
-    patches.placed(grid).map(move |(patch, brick, local)| (&patches.all[patch], corner(brick) + local.as_dvec3()))
 }
 
 /// The normal of a patch, as long as it has points.
