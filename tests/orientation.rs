@@ -601,6 +601,17 @@ fn what_was_scanned_from_amid_it_faces_the_scanner() {
     let result = orient(&cloud.points, Orient::Consistent);
     assert_eq!(components(&result)[0].side, Side::Air);
     assert_eq!(share_right(&result.normals, &cloud.normals), 1.0);
+    // And strays lie about a ball as far parts of a scan would.
+    let strays: Vec<f32> = (0..3000)
+        .flat_map(|_| {
+            let distance = 5.0 + 2.5 * random.unit();
+            random.direction().map(|c| distance * c)
+        })
+        .map(|c| c as f32)
+        .collect();
+    let ball = sphere(80_000, 85);
+    let result = orient(&[&ball.points[..], &strays].concat(), Orient::Consistent);
+    assert_eq!(share_right(&result.normals[..ball.points.len()], &ball.normals), 1.0);
 }
 
 /// A floor is seen from one side, and a ball over it from all.

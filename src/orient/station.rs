@@ -26,10 +26,13 @@ const FACING: f64 = 0.3;
 const LEAST_NEAR: f64 = 0.5;
 const MOST_NEAR: f64 = 1.5;
 
-/// The share of the variance of densities that is explained, times the power of the cosine that they go with, if that is less
-/// than 1: single scans have 0.3 and more, what was scanned from several places also less, and what was covered evenly, from all
+/// The share of the variance of densities that is explained, times the power of the cosine that they go with, or one over that if
+/// it is more than 1: single scans have 0.3 and more, what was scanned from several places also less, and what was covered evenly, from all
 /// sides, or more thinly along an axis, up to 0.11.
 const LEAST_CERTAINTY: f64 = 0.15;
+
+/// Cubes with fewer points hold strays, which lie as if seen from the middle of what they are strays of.
+const LEAST_POINTS: f64 = 2.0;
 
 /// How much nearness, twice the logarithm of the distance to base 2, deviates: where all is as far, nothing is told.
 const LEAST_DEPTH: f64 = 0.4;
@@ -205,10 +208,11 @@ fn law(spots: &[Spot], place: DVec3) -> Option<f64> {
             let distance = ray.length();
             let cosine = spot.normal.dot(ray).abs() / distance;
             // Nor in the very place.
-            (cosine >= FACING).then(|| DVec3::new(log2(spot.density), -2.0 * log2(distance), log2(cosine)))
+            (cosine >= FACING && spot.density >= LEAST_POINTS)
+                .then(|| DVec3::new(log2(spot.density), -2.0 * log2(distance), log2(cosine)))
         })
     });
-    let certainty = explained * slant.min(1.0);
+    let certainty = explained * slant.min(1.0 / slant);
     let is_scan = (LEAST_NEAR..=MOST_NEAR).contains(&near) && depth >= LEAST_DEPTH && certainty >= LEAST_CERTAINTY;
     is_scan.then_some(certainty)
 }
