@@ -42,6 +42,8 @@ interface Shown {
   positions: Float32Array;
   /** Those that the file brought. */
   normals: Float32Array | undefined;
+  /** Settled when its points are on the screen. */
+  drawn: Promise<void>;
   result?: { normals: Float32Array; curvature?: Float32Array; components?: Uint32Array };
   /** What the result was computed with. */
   options?: EstimateOptions;
@@ -89,16 +91,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
     store.set({ job: undefined, shading: shading === 'curvature' && !scan?.hasCurvature ? 'shaded' : shading });
   }
 
-  /** Reads a file, shows its points, and shades them. */
   async function show(file: File, step: Step): Promise<void> {
-    const draw = await read(file, step);
-    // In a task of its own: by then the worker has begun.
-    const drawn = new Promise((resolve) => setTimeout(resolve)).then(draw);
-    await Promise.all([shade(step), drawn]);
-  }
-
-  /** Takes the cloud of a file for the one on the screen; answers what draws it. */
-  async function read(file: File, step: Step): Promise<() => void> {
     const started = performance.now();
     const cloud = await readPointCloud(file, { signal: step.signal, onProgress: step.begin(`Reading ${file.name}`) });
     step.signal.throwIfAborted();
@@ -111,7 +104,9 @@ export function createSession(store: Store, viewer: Viewer): Session {
     const shading = store.state.shading === 'colors' && !hasColors ? 'shaded' : store.state.shading;
     // Gaussian splats bring zeros.
     const normals = cloud.normals?.some((value) => value !== 0) ? cloud.normals : undefined;
-    shown = { file, positions: cloud.positions, normals };
+    // In a task of its own: by then the worker has begun with the normals.
+    const drawn = new Promise((resolve) => setTimeout(resolve)).then(() => viewer.show(cloud, bounds, up));
+    shown = { file, positions: cloud.positions, normals, drawn };
     const scan = {
       name: file.name,
       points: cloud.count,
@@ -139,7 +134,6 @@ export function createSession(store: Store, viewer: Viewer): Session {
       cellText: '',
       orientKind: isPast ? 'consistent' : orientKind,
     });
-    return () => viewer.show(cloud, bounds, up);
   }
 
   async function shade(step: Step): Promise<void> {
@@ -159,13 +153,14 @@ export function createSession(store: Store, viewer: Viewer): Session {
     const { method = 'bilinear', k = 0, orient = 'none' } = options;
     const curvature = shading === 'curvature';
     const what = `normals${curvature ? ' and curvature' : ''}${method === 'bilinear' ? '' : `, ${METHODS[method].name}`}`;
-    const { report, ...result } = await estimateNormals(shown.positions, {
+    const estimate = estimateNormals(shown.positions, {
       ...options,
       curvature,
       components: hasSurfaces(orient),
       signal: step.signal,
       onProgress: step.begin(`Computing ${what}`),
     });
+    const [{ report, ...result }] = await Promise.all([estimate, shown.drawn]);
     step.signal.throwIfAborted();
     const { flipped, turnedSurfaces } = turned;
     if (flipped) negate(result.normals);
@@ -220,13 +215,17 @@ export function createSession(store: Store, viewer: Viewer): Session {
         store.set({ error: `${ONLY_PLY}; ${file.name} is none, so the work goes on` });
         return;
       }
-      await run(file.name, (step) => show(file, step));
+      await run(file.name, async (step) => {
+        await show(file, step);
+        await shade(step);
+      });
     },
 
     openSample: () =>
       run('The sample', async (step) => {
         step.begin('Making the sample');
         await show(await makeSample(step.signal), step);
+        await shade(step);
       }),
 
     estimate: () => run('Computing normals', shade),
