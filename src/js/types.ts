@@ -126,11 +126,12 @@ export interface Report {
    * `side` tells by what: `'air'`, because the surface is closed, and one side sees much more of the open air; `'volume'`, away
    * from the middle of what is open or hidden, or, of what is long and thin, from the middles of its pieces; `'sight'`, because
    * other surfaces, or its own parts, stand before that side; `'view'`, because the cloud is what a scanner saw from that side
-   * or from amid the surfaces (both by `'consistent'` only); `'convention'`, because it is open and flat, so that nothing tells: the mean normal has
-   * `x + 2y + 4z >= 0`, where all was seen from one side that of all surfaces. `confidence`, from 0, a guess, to 1, which is
-   * sure: of all that is seen of the open, how much more is seen from one side; for what sees nothing of it how much volume
-   * there is, of that of a sphere, or of its pieces; by sight, half of how much more looks at that side, of all that does; by
-   * view, up to a half, or from amid the surfaces how well their densities tell where it was. Only with `orient: 'consistent'` and `'outward'`.
+   * or from amid the surfaces (both by `'consistent'` only); `'convention'`, because it is open and flat, so that nothing
+   * tells: the mean normal has `x + 2y + 4z >= 0`, where all was seen from one side that of all surfaces. `confidence`, from
+   * 0, a guess, to 1, which is sure: of all that is seen of the open, how much more is seen from one side; for what sees
+   * nothing of it how much volume there is, of that of a sphere, or of its pieces; by sight, half of how much more looks at
+   * that side, of all that does; by view, up to a half, or from amid the surfaces how well their densities tell where it was.
+   * Only with `orient: 'consistent'` and `'outward'`.
    */
   components?: {
     count: number;

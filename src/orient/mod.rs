@@ -4,7 +4,8 @@
 //! into patches ([`patches`]), a patch and those round it say whether their signs agree ([`links`]), which sides of a patch
 //! are open to the air says which way is out ([`air`]), and the signs are chosen that these agree with best ([`groups`]), of
 //! open surfaces also what their parts see of each other ([`looks`]). These then face what stands before them ([`facing`]), or the
-//! scanner, if it saw all from one side ([`view`]) or from amid them ([`station`], [`thinning`]). In noise normals then become means of those about them ([`means`]).
+//! scanner, if it saw all from one side ([`view`]) or from amid them ([`station`]). In noise normals then become means of those
+//! about them ([`means`]).
 
 mod air;
 mod components;

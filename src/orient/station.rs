@@ -4,6 +4,7 @@ use super::components::{Decision, Side};
 use super::patches::{Patch, Patches, signed};
 use super::signs::Signs;
 use super::thinning::Thinning;
+use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::lattice::{BRICK, cube_centre};
@@ -27,11 +28,11 @@ const LEAST_NEAR: f64 = 0.5;
 const MOST_NEAR: f64 = 1.5;
 
 /// The share of the variance of densities that is explained, times the power of the cosine that they go with, or one over that if
-/// it is more than 1: single scans have 0.3 and more, what was scanned from several places also less, and what was covered evenly, from all
-/// sides, or more thinly along an axis, up to 0.11.
+/// it is more than 1. Single scans have 0.2 and more, what was scanned from several places also less, and what was covered evenly,
+/// from all sides, or more thinly along an axis, next to nothing.
 const LEAST_CERTAINTY: f64 = 0.15;
 
-/// Cubes with fewer points hold strays, which lie as if seen from the middle of what they are strays of.
+/// Cubes of fewer points hold strays: these lie thinly round what they stray from, as if it were near the scanner.
 const LEAST_POINTS: f64 = 2.0;
 
 /// How much nearness, twice the logarithm of the distance to base 2, deviates: where all is as far, nothing is told.
@@ -57,9 +58,9 @@ const GRAZING: f64 = 0.15;
 /// Where a scanner stood.
 ///
 /// It sends its rays in all directions alike, so of a surface that is twice as far it takes a quarter as many points, and fewer of
-/// what is slanted. Where densities follow this law about the middle of the points, the nearest of which are most of them, the
-/// cloud is a single scan: also if its surfaces enclose the place, as those of a room do and those of an object that was seen
-/// from outside, so that nothing else tells the two apart.
+/// what is slanted. Where densities follow this law about the middle of the points, most of which are near, the cloud is taken for
+/// a single scan: also if its surfaces enclose the place, as those of a room do and those of an object that was seen from
+/// outside, so that nothing else tells the two apart.
 pub(super) struct Station {
     /// In edges.
     place: DVec3,
@@ -109,66 +110,70 @@ impl Station {
     }
 }
 
-/// A group of 2 x 2 x 2 cubes: one alone may just be touched by the surface.
-#[derive(Clone, Copy)]
+/// What is known of 2 x 2 x 2 cubes: one alone may just be touched by the surface.
 struct Spot {
-    /// The middle of its points, in edges.
+    /// The middle of the points, in edges.
     place: DVec3,
     /// That of the largest patch.
     normal: DVec3,
-    points: f64,
     /// Points of an occupied cube.
     density: f64,
 }
 
-/// The cubes of every `step`th brick, brick by brick: the brick, the middle of the cube, in edges, its number, and its bit.
-fn cubes(grid: &Grid, step: usize) -> impl Iterator<Item = (usize, DVec3, usize, u32)> {
-    let all = (0..grid.blocks.len()).flat_map(|block| grid.cubes_in(block));
-    all.filter(move |(brick, ..)| brick.is_multiple_of(step)).map(|(brick, cube, bit)| {
-        let centre = (BRICK * grid.bricks.places[brick]).as_dvec3() + cube_centre(bit).as_dvec3();
-        (brick, centre, cube, bit)
-    })
+/// Sums over 2 x 2 x 2 cubes.
+#[derive(Clone, Copy, Default)]
+struct Group {
+    cubes: f64,
+    points: f64,
+    /// Of the places of all points.
+    sum: DVec3,
+    /// Points of the largest patch, and its normal.
+    largest: u32,
+    normal: DVec3,
+}
+
+/// The occupied cubes of a brick: the middle of each, in edges, its number, and its bit.
+fn cubes_of(grid: &Grid, brick: usize) -> impl Iterator<Item = (DVec3, usize, u32)> {
+    let corner = (BRICK * grid.bricks.places[brick]).as_dvec3();
+    let cubes = set_bits(grid.masks[brick]).zip(grid.first_cube[brick] as usize..);
+    cubes.map(move |(bit, cube)| (corner + cube_centre(bit).as_dvec3(), cube, bit))
 }
 
 /// Near the scanner, if it is a scan: of points at the same angles from each other the mean, where the near ones count more.
 fn middle(grid: &Grid) -> DVec3 {
-    let weighed = cubes(grid, 1).map(|(_, place, cube, _)| {
+    let (mut sum, mut all) = (DVec3::ZERO, 0.0);
+    for (place, cube, _) in (0..grid.bricks.len()).flat_map(|brick| cubes_of(grid, brick)) {
         let points = grid.points_of(cube).len() as f64;
-        (points * points.sqrt(), place)
-    });
-    let (sum, all) =
-        weighed.fold((DVec3::ZERO, 0.0), |(sum, all), (weight, place)| (sum + weight * place, all + weight));
+        let weight = points * points.sqrt();
+        sum += weight * place;
+        all += weight;
+    }
     sum / all
 }
 
 /// Those of every `step`th brick.
 fn spots(grid: &Grid, patches: &Patches, step: usize) -> Result<Vec<Spot>, Error> {
-    const NONE: Spot = Spot { place: DVec3::ZERO, normal: DVec3::ZERO, points: 0.0, density: 0.0 };
-    let mut spots: Vec<Spot> = Vec::new();
-    let (mut groups, mut largest, mut current) = ([NONE; 8], [0; 8], None);
-    for next in cubes(grid, step).map(Some).chain([None]) {
-        let brick = next.map(|(brick, ..)| brick);
-        if current != brick {
-            grow(&mut spots, groups.len(), WHAT)?;
-            spots.extend(groups.iter().filter(|group| group.points > 0.0).map(|group| Spot {
-                place: group.place / group.points,
-                // They were counted.
-                density: group.points / group.density,
-                ..*group
-            }));
-            (groups, largest, current) = ([NONE; 8], [0; 8], brick);
-        }
-        let Some((_, centre, cube, bit)) = next else { break };
-        let number = (bit >> 1 & 1 | bit >> 2 & 2 | bit >> 3 & 4) as usize;
-        let group = &mut groups[number];
-        group.density += 1.0;
-        for patch in &patches.all[patches.of_cube(cube)] {
-            group.place += f64::from(patch.points) * (centre + patch.centre.as_dvec3());
-            group.points += f64::from(patch.points);
-            if patch.points > largest[number] {
-                (largest[number], group.normal) = (patch.points, patch.normal.as_dvec3());
+    let mut spots = Vec::new();
+    for brick in (0..grid.bricks.len()).step_by(step) {
+        let mut groups = [Group::default(); 8];
+        for (centre, cube, bit) in cubes_of(grid, brick) {
+            let group = &mut groups[(bit >> 1 & 1 | bit >> 2 & 2 | bit >> 3 & 4) as usize];
+            group.cubes += 1.0;
+            for patch in &patches.all[patches.of_cube(cube)] {
+                let points = f64::from(patch.points);
+                group.points += points;
+                group.sum += points * (centre + patch.centre.as_dvec3());
+                if patch.points > group.largest {
+                    (group.largest, group.normal) = (patch.points, patch.normal.as_dvec3());
+                }
             }
         }
+        grow(&mut spots, groups.len(), WHAT)?;
+        spots.extend(groups.iter().filter(|group| group.points > 0.0).map(|group| Spot {
+            place: group.sum / group.points,
+            normal: group.normal,
+            density: group.points / group.cubes,
+        }));
     }
     Ok(spots)
 }
@@ -176,7 +181,7 @@ fn spots(grid: &Grid, patches: &Patches, step: usize) -> Result<Vec<Spot>, Error
 /// The patches of every `step`th brick.
 fn samples(grid: &Grid, patches: &Patches, signs: &Signs, step: usize) -> Result<Vec<Sample>, Error> {
     let mut samples = Vec::new();
-    for (_, centre, cube, _) in cubes(grid, step) {
+    for (centre, cube, _) in (0..grid.bricks.len()).step_by(step).flat_map(|brick| cubes_of(grid, brick)) {
         let own = patches.of_cube(cube);
         grow(&mut samples, own.len(), WHAT)?;
         samples.extend(own.map(|number| {
@@ -213,6 +218,7 @@ fn law(spots: &[Spot], place: DVec3) -> Option<f64> {
         })
     });
     let certainty = explained * slant.min(1.0 / slant);
+    // Not so where nothing tells them, and they are no numbers.
     let is_scan = (LEAST_NEAR..=MOST_NEAR).contains(&near) && depth >= LEAST_DEPTH && certainty >= LEAST_CERTAINTY;
     is_scan.then_some(certainty)
 }
@@ -263,8 +269,8 @@ fn faced(samples: &mut [Sample], middle: DVec3) -> Result<Option<DVec3>, Error> 
         // Not beyond infinity.
         scanner.w = scanner.w.max(0.0);
     }
-    let (cost, scanner) = best;
-    Ok((cost < f64::INFINITY).then(|| middle + unit / scanner.w * scanner.truncate()))
+    let (cost, found) = best;
+    Ok((cost < f64::INFINITY).then(|| middle + unit / found.w * found.truncate()))
 }
 
 #[cfg(test)]
@@ -280,7 +286,7 @@ mod tests {
         let spot = |(side, a, b): (DVec3, f64, f64)| {
             let place = size
                 * (side + a * DVec3::new(side.z, side.x, side.y).abs() + b * DVec3::new(side.y, side.z, side.x).abs());
-            Spot { place, normal: -side, points: 1.0, density: points(place, -side) }
+            Spot { place, normal: -side, density: points(place, -side) }
         };
         tiles.map(spot).collect()
     }
