@@ -614,6 +614,53 @@ fn what_was_scanned_from_amid_it_faces_the_scanner() {
     assert_eq!(share_right(&result.normals[..ball.points.len()], &ball.normals), 1.0);
 }
 
+/// The first place of hilly ground on a ray, no farther than 30, and its normal.
+fn first_on_hills(from: [f64; 3], along: [f64; 3]) -> Option<([f64; 3], [f64; 3])> {
+    let mut distance = 0.0;
+    while distance < 30.0 {
+        let place = [0, 1, 2].map(|axis| from[axis] + distance * along[axis]);
+        let gap = place[2] - hills(place[0], place[1]);
+        if gap < 1e-5 {
+            const STEP: f64 = 1e-4;
+            let [x, y, _] = place;
+            let rise = [
+                (hills(x + STEP, y) - hills(x - STEP, y)) / (2.0 * STEP),
+                (hills(x, y + STEP) - hills(x, y - STEP)) / (2.0 * STEP),
+            ];
+            let length = (rise[0] * rise[0] + rise[1] * rise[1] + 1.0).sqrt();
+            return Some((place, [-rise[0] / length, -rise[1] / length, 1.0 / length]));
+        }
+        // It rises by less than 1.
+        distance += (0.5 * gap).max(1e-5);
+    }
+    None
+}
+
+fn hills(x: f64, y: f64) -> f64 {
+    1.8 * (x / 8.0 + 1.0).sin() * (y / 10.0).cos() + 0.2 * (x / 2.5 + y / 3.5).sin()
+}
+
+/// Of ground with hollows and hills nothing but densities tells which side is up, as the middle of the points lies in it.
+#[test]
+fn open_ground_faces_the_scanner() {
+    for (seed, x, y) in [(91, 0.0, 0.0), (92, 6.0, -3.0), (93, -20.0, 14.0)] {
+        for height in [1.7, 8.0] {
+            for (is_wide, noise) in [(true, 0.0), (true, 0.0002), (false, 0.0), (false, 0.0002)] {
+                let from = [x, y, hills(x, y) + height];
+                let mut random = Random(seed);
+                let samples = std::iter::from_fn(|| Some(random.direction()))
+                    .filter(|along| along[2] > -0.9 && (is_wide || along[0] > 0.7))
+                    .filter_map(|along| first_on_hills(from, along));
+                let cloud = Cloud::of(samples.take(50_000).map(|(p, n)| (turn(p), turn(n)))).noisy(noise, 5);
+                let result = orient(&cloud.points, Orient::Consistent);
+                let right = share_right(&result.normals, &cloud.normals);
+                let about = format!("{x}, {y}, {height}, {is_wide}, {noise}: {right}, {:?}", components(&result));
+                assert!(right > 0.999, "{about}");
+            }
+        }
+    }
+}
+
 /// A floor is seen from one side, and a ball over it from all.
 #[test]
 fn what_was_scanned_all_round_is_no_part_of_a_view() {

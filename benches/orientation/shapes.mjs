@@ -2,6 +2,7 @@
 // the outside of. Samplers as there; normals point outwards.
 
 import { SHAPES as KNOWN } from '../accuracy/shapes.mjs';
+import { hills } from './hills.mjs';
 import { scene } from './scene.mjs';
 
 const TAU = 2 * Math.PI;
@@ -146,4 +147,5 @@ export const SHAPES = {
   scene: { shape: scene(3), kind: 'scene', noise: 'noise0.12' },
   view: { shape: scene(1), kind: 'scene', noise: 'noise0.12' },
   hall: { shape: scene(1, true), kind: 'scene', noise: 'noise0.12' },
+  hills: { shape: hills, kind: 'scene', noise: 'noise0.12' },
 };

@@ -4,8 +4,8 @@
 //! into patches ([`patches`]), a patch and those round it say whether their signs agree ([`links`]), which sides of a patch
 //! are open to the air says which way is out ([`air`]), and the signs are chosen that these agree with best ([`groups`]), of
 //! open surfaces also what their parts see of each other ([`looks`]). These then face what stands before them ([`facing`]), or the
-//! scanner, if it saw all from one side ([`view`]) or from amid them ([`station`]). In noise normals then become means of those
-//! about them ([`means`]).
+//! scanner, if one saw all: where it stood, if densities tell that ([`station`]), or the direction from which it did ([`view`]).
+//! In noise normals then become means of those about them ([`means`]).
 
 mod air;
 mod components;
@@ -16,7 +16,9 @@ mod links;
 mod looks;
 mod means;
 mod patches;
+mod place;
 mod signs;
+mod spots;
 mod station;
 mod thinning;
 mod view;
@@ -128,8 +130,8 @@ fn surfaces(
     };
     let mut decisions = decide(grid, &patches, &sights, &mut signs)?;
     match scanner {
-        Some(Scanner::Amid(station)) => station.turn_to_it(grid, &patches, &mut signs, &mut decisions)?,
-        Some(Scanner::Beside(view)) => view.turn_to_it(grid, &patches, looks.as_ref(), &mut signs, &mut decisions)?,
+        Some(Scanner::At(station)) => station.turn_to_it(grid, &patches, &mut signs, &mut decisions)?,
+        Some(Scanner::Towards(view)) => view.turn_to_it(grid, &patches, looks.as_ref(), &mut signs, &mut decisions)?,
         None if options.orient == Orient::Consistent => {
             let facing = stage.part(0.9..0.95);
             facing::turn_to_what_looks(grid, &patches, &sights, looks, &mut signs, &mut decisions, &facing)?;
@@ -148,10 +150,10 @@ fn surfaces(
 
 /// Where the one scanner was that saw all.
 enum Scanner {
-    /// Among the surfaces.
-    Amid(Station),
-    /// To one side of them.
-    Beside(View),
+    /// In this place.
+    At(Station),
+    /// In this direction.
+    Towards(View),
 }
 
 /// Signs that trust no part of the open that may mislead: of what is not closed a share counts, beside what its patches see of
@@ -171,9 +173,9 @@ fn consistent(
         looks = Some(Looks::from_the_open(grid, patches, sights)?);
         choice.be_cautious(None, sights, &stage.part(0.3..0.5))?;
     }
-    let scanner = match Station::of(grid, patches, choice.signs())? {
-        Some(station) => Some(Scanner::Amid(station)),
-        None => View::of(grid, patches, noise, choice.signs(), &stage.part(0.5..0.6))?.map(Scanner::Beside),
+    let scanner = match Station::of(grid, patches, choice.signs(), choice.is_all_closed())? {
+        Some(station) => Some(Scanner::At(station)),
+        None => View::of(grid, patches, noise, choice.signs(), &stage.part(0.5..0.6))?.map(Scanner::Towards),
     };
     if looks.is_some() && scanner.is_none() {
         choice.be_cautious(looks.as_ref(), sights, &stage.part(0.6..1.0))?;

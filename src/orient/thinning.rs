@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-/// The function `near * nearness + slant * slantedness` that fits the logarithms of densities best, by least squares.
+/// The function `near * nearness + slant * slantedness` that fits the logarithms of densities best, by weighted least squares.
 pub(super) struct Thinning {
-    /// Densities it was fitted to.
+    /// Densities it was fitted to, by their weights.
     pub count: f64,
     pub near: f64,
     /// The standard error of that.
@@ -17,16 +17,20 @@ pub(super) struct Thinning {
 }
 
 impl Thinning {
-    /// That of samples, each with the logarithm of its density, its nearness and its slantedness.
-    pub fn of<I: Iterator<Item = DVec3>>(samples: impl Fn() -> I) -> Self {
-        let (count, sum) = samples().fold((0.0, DVec3::ZERO), |(count, sum), one| (count + 1.0, sum + one));
+    /// That of samples, each with its weight, and the logarithm of its density, its nearness and its slantedness.
+    pub fn of<I: Iterator<Item = (f64, DVec3)>>(samples: impl Fn() -> I) -> Self {
+        let (mut count, mut sum) = (0.0, DVec3::ZERO);
+        for (weight, one) in samples() {
+            count += weight;
+            sum += weight * one;
+        }
         let mean = sum / count;
         let [mut by_points, mut by_nearness, mut by_slant] = [DVec3::ZERO; 3];
-        for one in samples() {
+        for (weight, one) in samples() {
             let off = one - mean;
-            by_points += off.x * off;
-            by_nearness += off.y * off;
-            by_slant += off.z * off;
+            by_points += weight * off.x * off;
+            by_nearness += weight * off.y * off;
+            by_slant += weight * off.z * off;
         }
         // Where all is slanted alike, that explains nothing.
         by_slant.z += 1e-6 * count;

@@ -241,7 +241,7 @@ impl View {
             patches.places(grid).filter(|(patch, _)| !patch.has_rival).filter_map(|(patch, place)| {
                 let cosine = self.cosine(patch, false).abs();
                 let nearness = self.towards.as_dvec3().dot(place);
-                (cosine >= FACING).then(|| DVec3::new(log2(patch.points.into()), nearness, log2(cosine.into())))
+                (cosine >= FACING).then(|| (1.0, DVec3::new(log2(patch.points.into()), nearness, log2(cosine.into()))))
             })
         };
         let Thinning { count, near, error, depth, .. } = Thinning::of(samples);
