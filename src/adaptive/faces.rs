@@ -93,7 +93,7 @@ impl Face {
 pub(super) struct Faces {
     all: Vec<Face>,
     /// Variance of the points' distances from them.
-    noise: f32,
+    pub noise: f32,
     /// What they are to explain: each with a 1.
     places: Vec<Vec4>,
 }

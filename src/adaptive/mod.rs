@@ -105,7 +105,10 @@ pub(crate) fn normals(
     let chosen = choose(&levels, &stage.part(0.0..0.4))?;
     let tally = Tally::new();
     let facets = options.orient.is_of_surfaces();
-    let mut run = Run { batch: BATCH.max(count / 8), facets, normals: &normals, tally: &tally, cubes: 0, surfaces: 0 };
+    // Without signs they are never asked for, and left out of the module then.
+    let exact = cfg!(feature = "full") && facets && facets::are_exact(&levels[levels.len() - 1], &chosen);
+    let mut run =
+        Run { batch: BATCH.max(count / 8), facets, exact, normals: &normals, tally: &tally, cubes: 0, surfaces: 0 };
     let parts = run.settle(&levels, &chosen, 0, &stage.part(0.4..1.0))?;
     drop(chosen);
     lap("vote");
@@ -124,6 +127,8 @@ struct Run<'a> {
     batch: usize,
     /// Whether narrow faces are told by points: where signs are, lines matter most.
     facets: bool,
+    /// Whether they may be told everywhere: points lie exactly on their surfaces.
+    exact: bool,
     normals: &'a Normals,
     tally: &'a Tally,
     cubes: u64,
@@ -142,7 +147,15 @@ impl Run<'_> {
         stage: &Stage,
     ) -> Result<Vec<Role>, Error> {
         let level = &levels[levels.len() - 1];
-        let vote = Vote { level, chosen, division, facets: self.facets, normals: self.normals, tally: self.tally };
+        let vote = Vote {
+            level,
+            chosen,
+            division,
+            facets: self.facets,
+            exact: self.exact,
+            normals: self.normals,
+            tally: self.tally,
+        };
         let parts = vote.run(stage)?;
         let is_done = |cube: usize| level.role(cube) == Role::Wanted && parts[cube] != Role::Wanted;
         for (_, chosen) in chosen.iter().enumerate().filter(|&(cube, _)| is_done(cube)) {

@@ -84,6 +84,8 @@ pub(super) struct Vote<'a> {
     pub division: usize,
     /// Whether narrow faces are told by points.
     pub facets: bool,
+    /// Whether the cloud is exact ([`facets::are_exact`]).
+    pub exact: bool,
     pub normals: &'a Normals,
     pub tally: &'a Tally,
 }
@@ -146,6 +148,10 @@ impl<'a> Task<'a> {
         if chosen[cube].noise <= TORN {
             return false;
         }
+        if self.vote.exact {
+            // Even where nothing near by lies on one face.
+            return true;
+        }
         if self.cleanest.0 != brick {
             let noise = |cube: u32| chosen[cube as usize].flat_noise;
             self.cleanest = (brick, self.around.least(&level.grid, brick, noise));
@@ -180,7 +186,9 @@ impl<'a> Task<'a> {
         let mut is_edge = false;
         if smooth.is_none() {
             let near = self.around.near(&level.grid, brick, bit, 2);
-            is_edge = has_many && self.faces.find(level, bit, near, chosen);
+            // In an exact cloud a plane in noise is both sides of a wall, and its rim none of the faces.
+            is_edge =
+                has_many && self.faces.find(level, bit, near, chosen) && !(self.vote.exact && self.faces.noise > TORN);
             if !is_edge {
                 let noise = LazyCell::new(|| quartile(near.iter().map(|near| chosen[near.cube as usize].flat_noise)));
                 if can_divide {
@@ -220,10 +228,9 @@ impl<'a> Task<'a> {
                 unsafe { self.writer.write_lanes(points, four.len(), directions) };
             }
         } else {
-            let near = is_torn.then(|| self.around.near(&level.grid, brick, bit, 1));
             for p in placed {
                 let place = p.local - centre;
-                let facet = near.and_then(|near| facets::normal(level, bit, near, place));
+                let facet = if is_torn { facets::normal(level, brick, bit, &mut self.around, place) } else { None };
                 let direction = facet.unwrap_or_else(|| match &smooth {
                     Some(smooth) => smooth.direction(place),
                     None => self.ballot.vote(place),
