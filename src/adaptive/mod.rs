@@ -4,7 +4,7 @@
 //! round each cube, on grids of ever larger cubes ([`level`], [`surface`]); for each cube the size that is least in error
 //! ([`choose`]); where the surfaces round a cube then agree they give the normals of its points, where not the cube is
 //! divided, and where that is of no use or not possible the points vote ([`vote`]). With signs for surfaces, points of narrow faces
-//! without noise lie on planes of their own ([`facets`]).
+//! without noise lie on planes of their own ([`facets`]), and on either of two sheets that nearly touch ([`sheets`]).
 
 mod around;
 mod choose;
@@ -13,6 +13,7 @@ mod facets;
 mod level;
 mod matrix;
 mod samples;
+mod sheets;
 mod surface;
 mod tally;
 mod vote;

@@ -6,6 +6,7 @@ use super::faces::Faces;
 use super::facets;
 use super::level::{Level, Role};
 use super::matrix::{dot_lanes, times_lanes};
+use super::sheets::Sheets;
 use super::tally::Tally;
 use super::{DIVISIONS, WHAT};
 use crate::error::Error;
@@ -76,6 +77,9 @@ const TORN: f32 = 0.0064;
 /// and where the cloud has no noise: near by lies a surface with less.
 const CLEAN: f32 = 1e-5;
 
+/// In an exact cloud a surface with more noise than this, in edges and squared, may lie between two sheets.
+const BETWEEN: f32 = 1e-4;
+
 /// The cubes of a level, and the surfaces they rest on.
 pub(super) struct Vote<'a> {
     pub level: &'a Level,
@@ -121,6 +125,7 @@ struct Task<'a> {
     around: Around,
     ballot: Ballot,
     faces: Faces,
+    sheets: Sheets,
     /// A brick, and the least noise of a surface in and two cubes round it.
     cleanest: (usize, f32),
     resolved: u64,
@@ -135,6 +140,7 @@ impl<'a> Task<'a> {
             around: Around::new(),
             ballot: Ballot::default(),
             faces: Faces::default(),
+            sheets: Sheets::new(),
             cleanest: (usize::MAX, 0.0),
             resolved: 0,
         }
@@ -217,7 +223,10 @@ impl<'a> Task<'a> {
         let centre = cube_centre(bit);
         // Without signs they are never asked for, and left out of the module then.
         let is_torn = cfg!(feature = "full") && self.vote.facets && !is_edge && self.is_torn(brick, cube);
-        if is_edge || smooth.is_some() && !is_torn {
+        // Before cubes were divided they have too many points, and what bends is no sheet yet.
+        let may_be_between =
+            cfg!(feature = "full") && self.vote.exact && division > 0 && !is_edge && own.noise > BETWEEN;
+        if is_edge || smooth.is_some() && !is_torn && !may_be_between {
             for four in placed.chunks(4) {
                 let (places, points) = located(four, centre);
                 let directions = match &smooth {
@@ -228,9 +237,20 @@ impl<'a> Task<'a> {
                 unsafe { self.writer.write_lanes(points, four.len(), directions) };
             }
         } else {
+            let mut is_between = None;
             for p in placed {
                 let place = p.local - centre;
-                let facet = if is_torn { facets::normal(level, brick, bit, &mut self.around, place) } else { None };
+                let mut facet = None;
+                if is_torn {
+                    facet = facets::normal(level, brick, bit, &mut self.around, place);
+                }
+                if facet.is_none() && may_be_between {
+                    let is_between = *is_between.get_or_insert_with(|| {
+                        let near = self.around.near(&level.grid, brick, bit, 1);
+                        self.sheets.find(level, bit, near, surface)
+                    });
+                    facet = is_between.then(|| self.sheets.direction(place));
+                }
                 let direction = facet.unwrap_or_else(|| match &smooth {
                     Some(smooth) => smooth.direction(place),
                     None => self.ballot.vote(place),

@@ -373,7 +373,7 @@ mod tests {
     }
 
     fn patch(centre: Vec3, points: u32) -> Patch {
-        Patch { centre, normal: Vec3::Z, points, flatness: 1.0, has_rival: false }
+        Patch { centre, normal: Vec3::Z, points, flatness: 1.0, has_rival: false, bend: 0.0 }
     }
 
     #[test]

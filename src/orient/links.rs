@@ -262,10 +262,11 @@ fn shares([a, b]: [&Patch; 2], [of_a, of_b]: [&[Patch]; 2], step: Vec3) -> f32 {
 /// second one, which has some, of `all` in its cube, lies better in line with the first.
 #[inline(never)]
 fn share(a: &Patch, b: &Patch, all: &[Patch], step: Vec3) -> f32 {
-    // How far the two lie off each other's planes.
+    // How far the two lie off each other's planes, or off what these bend to.
     let off = |other: &Patch| {
         let line = step + (other.centre - a.centre);
-        let (x, y) = (line.dot(a.normal), line.dot(other.normal));
+        let rise = 0.5 * line.length_squared();
+        let (x, y) = (line.dot(a.normal) - rise * a.bend, line.dot(other.normal) + rise * other.bend);
         x * x + y * y + EVEN
     };
     let mut share: f32 = 1.0;
@@ -283,7 +284,7 @@ mod tests {
     use super::*;
 
     fn patch(centre: Vec3, normal: Vec3) -> Patch {
-        Patch { centre, normal, points: 16, flatness: 1.0, has_rival: false }
+        Patch { centre, normal, points: 16, flatness: 1.0, has_rival: false, bend: 0.0 }
     }
 
     fn evidence(a: &Patch, b: &Patch, step: u32, squarings: usize) -> f32 {

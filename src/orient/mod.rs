@@ -17,6 +17,7 @@ mod looks;
 mod means;
 mod patches;
 mod place;
+mod sheets;
 mod signs;
 mod spots;
 mod station;

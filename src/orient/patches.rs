@@ -1,5 +1,6 @@
 //! The points of a cube, parted into those that lie on one piece of surface.
 
+use super::sheets::{self, Doubt};
 use crate::error::Error;
 use crate::grid::{Grid, Placed};
 use crate::lattice::{BRICK, cube_centre};
@@ -23,6 +24,8 @@ pub(super) struct Patch {
     pub flatness: f32,
     /// Whether another one of its cube is alike but for its place, as that of the other side of a wall.
     pub has_rival: bool,
+    /// How far it bends towards its normal within an edge, as a slope, where it was told from another sheet by that; else zero.
+    pub bend: f32,
 }
 
 impl Patch {
@@ -105,6 +108,9 @@ const DEVIATIONS: f32 = 2.2;
 const UNEVEN: f32 = 0.04;
 const UNEVEN_DEVIATIONS: f32 = 4.0;
 
+/// With less noise, in edges, there is none: some is always found where surfaces bend.
+const EXACT: f32 = 0.0075;
+
 /// Patches less alike than so, as those of the two faces of an edge, are no rivals.
 const UNLIKE: f32 = 0.1;
 
@@ -120,6 +126,8 @@ struct Limits {
     cosine_squared: f32,
     /// The variance at which the patch is half as flat.
     uneven: f32,
+    /// Whether there is none, so that places and normals may tell sheets that nearly touch.
+    is_exact: bool,
 }
 
 impl Limits {
@@ -127,7 +135,12 @@ impl Limits {
     fn of(noise: f32) -> Self {
         let uneven = UNEVEN.max(UNEVEN_DEVIATIONS * noise);
         let cosine_squared = COSINE_SQUARED + (noise / NOISE).min(1.0) * (COSINE_SQUARED_IN_NOISE - COSINE_SQUARED);
-        Self { thickness: THICKNESS.max(DEVIATIONS * noise), cosine_squared, uneven: uneven * uneven }
+        Self {
+            thickness: THICKNESS.max(DEVIATIONS * noise),
+            cosine_squared,
+            uneven: uneven * uneven,
+            is_exact: noise < EXACT,
+        }
     }
 
     /// The flatness of so many points, with the sum of their square distances from the plane.
@@ -209,7 +222,26 @@ fn split(
     of_point: &mut [MaybeUninit<Membership>],
 ) {
     let first = patches.len();
-    if let Some(patch) = whole(points, normals, centre, limits) {
+    let whole = whole(points, normals, centre, limits);
+    if limits.is_exact
+        && whole.as_ref().is_none_or(|(_, doubt)| doubt.is_some())
+        && let Some(normal) = alike(normals, limits)
+    {
+        let second = sheets::second(points, normals, normal);
+        let side = |i: usize| (second >> i & 1) as usize;
+        if second != 0 {
+            for number in 0..2 {
+                let all = points.iter().zip(normals).enumerate();
+                let own = all.filter(|&(i, _)| side(i) == number).map(|(_, one)| one);
+                patches.push(sheet(own, normal, centre, limits));
+            }
+            for (i, (membership, &normal)) in of_point.iter_mut().zip(normals).enumerate() {
+                membership.write(Membership::new(side(i), patches[first + side(i)].normal.dot(normal) < 0.0));
+            }
+            return;
+        }
+    }
+    if let Some((patch, _)) = whole {
         patches.push(patch);
         for (membership, &normal) in of_point.iter_mut().zip(normals) {
             membership.write(Membership::new(0, patch.normal.dot(normal) < 0.0));
@@ -240,7 +272,14 @@ fn split(
         }
         let number = best.unwrap_or(own.len());
         if number == own.len() {
-            patches.push(Patch { centre: Vec3::ZERO, normal: Vec3::ZERO, points: 0, flatness: 0.0, has_rival: false });
+            patches.push(Patch {
+                centre: Vec3::ZERO,
+                normal: Vec3::ZERO,
+                points: 0,
+                flatness: 0.0,
+                has_rival: false,
+                bend: 0.0,
+            });
         }
         // Sums until all are in.
         let patch = &mut patches[first + number];
@@ -268,29 +307,60 @@ fn split(
 }
 
 /// All points of a cube as one patch, if they lie on one: so most do, and need not be sorted.
-fn whole(points: &[Placed], normals: &[Vec3], centre: Vec3, limits: Limits) -> Option<Patch> {
+fn whole(points: &[Placed], normals: &[Vec3], centre: Vec3, limits: Limits) -> Option<(Patch, Doubt)> {
     let (mut place, mut normal) = (Vec3::ZERO, Vec3::ZERO);
     for (point, &own) in points.iter().zip(normals) {
         place += point.local;
         normal += aligned(own, normal);
     }
     let (place, normal) = (place / points.len() as f32, normal.try_normalize()?);
-    let mut squares = 0.0;
+    let (mut squares, mut doubt) = (0.0, Doubt::NONE);
     for (point, &own) in points.iter().zip(normals) {
-        let (along, off) = (normal.dot(own), (point.local - place).dot(normal));
+        let d = point.local - place;
+        let (along, off) = (normal.dot(own), d.dot(normal));
         if along * along < limits.cosine_squared || off.abs() >= limits.thickness {
             return None;
         }
         squares += off * off;
+        if limits.is_exact {
+            doubt.add(off, signed(along < 0.0, d.dot(own)));
+        }
     }
     let count = points.len() as u32;
-    Some(Patch {
-        centre: place - centre,
-        normal,
-        points: count,
-        flatness: limits.flatness(squares, count),
-        has_rival: false,
-    })
+    let flatness = limits.flatness(squares, count);
+    Some((Patch { centre: place - centre, normal, points: count, flatness, has_rival: false, bend: 0.0 }, doubt))
+}
+
+/// The mean normal of all points, if theirs are as alike as those of a patch.
+fn alike(normals: &[Vec3], limits: Limits) -> Option<Vec3> {
+    let normal = normals.iter().fold(Vec3::ZERO, |sum, &own| sum + aligned(own, sum)).try_normalize()?;
+    let is_alike = |own: &Vec3| normal.dot(*own).powi(2) >= limits.cosine_squared;
+    normals.iter().all(is_alike).then_some(normal)
+}
+
+/// The patch of one of two sheets whose normals are about `normal`.
+#[optimize(size)]
+#[inline(never)]
+fn sheet<'a>(
+    points: impl Iterator<Item = (&'a Placed, &'a Vec3)> + Clone,
+    normal: Vec3,
+    centre: Vec3,
+    limits: Limits,
+) -> Patch {
+    let count = points.clone().count() as u32;
+    let place = points.clone().map(|(point, _)| point.local).sum::<Vec3>() / count as f32;
+    let normal = points.clone().map(|(_, &own)| aligned(own, normal)).sum::<Vec3>().normalize_or(Vec3::Z);
+    let (mut squares, mut rise, mut width) = (0.0, 0.0, 0.0);
+    for (point, &own) in points {
+        let d = point.local - place;
+        let height = d.dot(normal);
+        squares += height * height;
+        rise += height - d.dot(aligned(own, normal));
+        width += d.length_squared();
+    }
+    let bend = if width > 0.0 { rise / width } else { 0.0 };
+    let flatness = limits.flatness(squares, count);
+    Patch { centre: place - centre, normal, points: count, flatness, has_rival: true, bend }
 }
 
 /// A normal, or its opposite if that is more like `other`.

@@ -1,0 +1,140 @@
+//! Two sheets in one cube that nearly touch, as where round bodies do, or that meet at a small angle, as at the tip of a blade,
+//! told apart by how exactly lines and places of points go together.
+//!
+//! On one sheet, if it bends evenly, what lies between two points is across the mean of their normals. So where there is no
+//! noise points of two sheets are told apart however thin the gap is.
+
+use crate::grid::Placed;
+use glam::Vec3;
+
+/// Cubes of more points are left to the limits of patches.
+const ROOM: usize = u64::BITS as usize;
+
+/// A sheet has so many points at least: two are always of one.
+const LEAST: u32 = 3;
+
+/// Twice how far two points lie off a common sheet, in edges and squared: less is no reason to look for two.
+const APART: f32 = 4e-4;
+
+/// Off their own sheet points lie by less than this share of what they lie off the other one, both squared.
+const CLEAR: f32 = 0.25;
+
+/// How often points may change sides.
+const ROUNDS: usize = 8;
+
+/// Whether points lie off one sheet, or one bends both ways.
+pub(super) struct Doubt {
+    count: f32,
+    /// The sum over all points, and that of the squares, of what they lie off a sheet that goes through their mean,
+    off: [f32; 2],
+    /// and of what the sheet bends up to there, as their normals tell.
+    bend: [f32; 2],
+}
+
+impl Doubt {
+    pub const NONE: Self = Self { count: 0.0, off: [0.0; 2], bend: [0.0; 2] };
+
+    /// Counts a point that lies so high along the mean normal, and along its own.
+    #[inline(always)]
+    pub fn add(&mut self, height: f32, own: f32) {
+        let (off, bend) = (height + own, height - own);
+        self.count += 1.0;
+        self.off = [self.off[0] + off, self.off[1] + off * off];
+        self.bend = [self.bend[0] + bend, self.bend[1] + bend * bend];
+    }
+
+    /// Whether there may be two sheets. Of an even bend along one direction the mean of the squares is 1.8 times the square of
+    /// the mean.
+    pub fn is_some(&self) -> bool {
+        const LEAST: f32 = 2.5e-5;
+        const BOTH_WAYS: f32 = 0.3;
+        let Self { count, off, bend } = *self;
+        count * off[1] - off[0] * off[0] > LEAST * count * count
+            || bend[1] > LEAST * count && bend[0] * bend[0] < BOTH_WAYS * count * bend[1]
+    }
+}
+
+/// A bit for each point that is on the second of two sheets; none if these are not two. `normal` is about that of all points.
+#[optimize(size)]
+#[inline(never)]
+pub(super) fn second(points: &[Placed], normals: &[Vec3], normal: Vec3) -> u64 {
+    let count = points.len();
+    if count > ROOM || (count as u32) < 2 * LEAST {
+        return 0;
+    }
+    let mut upward = [Vec3::ZERO; ROOM];
+    upward.iter_mut().zip(normals).for_each(|(upward, &own)| *upward = own * normal.dot(own).signum());
+    let off = |i: usize, j: usize| (points[i].local - points[j].local).dot(upward[i] + upward[j]).powi(2);
+    // The point farthest from the middle, because all sheets go on from where they touch, and the one farthest off its sheet.
+    let middle = points.iter().map(|point| point.local).sum::<Vec3>() / count as f32;
+    let farthest = |distance: &dyn Fn(usize) -> f32| {
+        (0..count).max_by(|&i, &j| distance(i).total_cmp(&distance(j))).unwrap_or_default()
+    };
+    let a = farthest(&|i| points[i].local.distance_squared(middle));
+    let b = farthest(&|i| off(i, a));
+    if off(b, a) < APART {
+        return 0;
+    }
+    let bits = |is_second: &dyn Fn(usize) -> bool| (0..count).map(|i| u64::from(is_second(i)) << i).sum::<u64>();
+    let mut second = bits(&|i| off(i, b) < off(i, a));
+    for _ in 0..ROUNDS {
+        let counts = [count as u32 - second.count_ones(), second.count_ones()];
+        if counts[0].min(counts[1]) < LEAST {
+            return 0;
+        }
+        let side = |i: usize| (second >> i & 1) as usize;
+        // How far a point lies off the others of a sheet.
+        let mean = |i: usize, sheet: usize| {
+            let others = counts[sheet] - u32::from(side(i) == sheet);
+            (0..count).filter(|&j| side(j) == sheet).map(|j| off(i, j)).sum::<f32>() / others as f32
+        };
+        let (mut within, mut between) = (0.0, 0.0);
+        let next = (0..count).fold(0, |next, i| {
+            let means = [mean(i, 0), mean(i, 1)];
+            within += means[side(i)];
+            between += means[1 - side(i)];
+            next | u64::from(means[1] < means[0]) << i
+        });
+        if next == second {
+            return if within < CLEAR * between { second } else { 0 };
+        }
+        second = next;
+    }
+    0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of points in a square at the heights that `height` tells, with the slopes there.
+    fn second_of(height: impl Fn(usize, f32, f32) -> (f32, f32, f32)) -> u64 {
+        let places = (0..30).map(|i| ((i * 7 % 30) as f32 / 30.0 - 0.5, (i * 11 % 31) as f32 / 31.0 - 0.5));
+        let all = places.enumerate().map(|(i, (x, y))| {
+            let (z, by_x, by_y) = height(i, x, y);
+            (Placed { local: Vec3::new(x, y, z), point: i as u32 }, Vec3::new(-by_x, -by_y, 1.0).normalize())
+        });
+        let (points, normals): (Vec<Placed>, Vec<Vec3>) = all.unzip();
+        second(&points, &normals, Vec3::Z)
+    }
+
+    #[test]
+    fn sheets_that_touch_are_two_and_what_bends_is_one() {
+        let odd = (0..30).filter(|i| i % 2 == 1).map(|i| 1u64 << i).sum::<u64>();
+        let even = !odd & ((1 << 30) - 1);
+        for bend in [0.1, 0.2] {
+            let touching = second_of(|i, x, y| {
+                let bend = if i % 2 == 0 { bend } else { -bend };
+                (0.5 * bend * (x * x + y * y), bend * x, bend * y)
+            });
+            assert!(touching == odd || touching == even, "{bend}: {touching:b}");
+            assert_eq!(second_of(|_, x, y| (0.5 * bend * (x * x + y * y), bend * x, bend * y)), 0);
+            assert_eq!(second_of(|_, x, y| (bend * x * y, bend * y, bend * x)), 0, "a saddle");
+        }
+        let blade = second_of(|i, x, _| {
+            let slope = if i % 2 == 0 { 0.25 } else { -0.25 };
+            (slope * (x + 0.5), slope, 0.0)
+        });
+        assert!(blade == odd || blade == even, "{blade:b}");
+    }
+}
