@@ -222,26 +222,10 @@ fn split(
     of_point: &mut [MaybeUninit<Membership>],
 ) {
     let first = patches.len();
-    let whole = whole(points, normals, centre, limits);
-    if limits.is_exact
-        && whole.as_ref().is_none_or(|(_, doubt)| doubt.is_some())
-        && let Some(normal) = alike(normals, limits)
-    {
-        let second = sheets::second(points, normals, normal);
-        let side = |i: usize| (second >> i & 1) as usize;
-        if second != 0 {
-            for number in 0..2 {
-                let all = points.iter().zip(normals).enumerate();
-                let own = all.filter(|&(i, _)| side(i) == number).map(|(_, one)| one);
-                patches.push(sheet(own, normal, centre, limits));
-            }
-            for (i, (membership, &normal)) in of_point.iter_mut().zip(normals).enumerate() {
-                membership.write(Membership::new(side(i), patches[first + side(i)].normal.dot(normal) < 0.0));
-            }
+    if let Some((patch, doubt)) = whole(points, normals, centre, limits) {
+        if limits.is_exact && doubt.is_some() && part(points, normals, centre, limits, patches, of_point) {
             return;
         }
-    }
-    if let Some((patch, _)) = whole {
         patches.push(patch);
         for (membership, &normal) in of_point.iter_mut().zip(normals) {
             membership.write(Membership::new(0, patch.normal.dot(normal) < 0.0));
@@ -290,6 +274,13 @@ fn split(
         of_point[i].write(Membership::new(number, is_opposite));
         *number_or_key = number as u64;
     }
+    if limits.is_exact && patches.len() == first + 1 {
+        let one = patches.pop();
+        if part(points, normals, centre, limits, patches, of_point) {
+            return;
+        }
+        patches.extend(one);
+    }
     let own = &mut patches[first..];
     for patch in &mut *own {
         patch.centre /= patch.points as f32;
@@ -329,6 +320,32 @@ fn whole(points: &[Placed], normals: &[Vec3], centre: Vec3, limits: Limits) -> O
     let count = points.len() as u32;
     let flatness = limits.flatness(squares, count);
     Some((Patch { centre: place - centre, normal, points: count, flatness, has_rival: false, bend: 0.0 }, doubt))
+}
+
+/// Parts the points of a cube into two sheets that nearly touch, if they lie on such.
+fn part(
+    points: &[Placed],
+    normals: &[Vec3],
+    centre: Vec3,
+    limits: Limits,
+    patches: &mut Vec<Patch>,
+    of_point: &mut [MaybeUninit<Membership>],
+) -> bool {
+    let Some(normal) = alike(normals, limits) else { return false };
+    let second = sheets::second(points, normals, normal);
+    if second == 0 {
+        return false;
+    }
+    let side = |i: usize| (second >> i & 1) as usize;
+    let both = [0, 1].map(|number| {
+        let all = points.iter().zip(normals).enumerate();
+        sheet(all.filter(|&(i, _)| side(i) == number).map(|(_, one)| one), normal, centre, limits)
+    });
+    patches.extend(both);
+    for (i, (membership, &normal)) in of_point.iter_mut().zip(normals).enumerate() {
+        membership.write(Membership::new(side(i), both[side(i)].normal.dot(normal) < 0.0));
+    }
+    true
 }
 
 /// The mean normal of all points, if theirs are as alike as those of a patch.
