@@ -7,6 +7,7 @@ use super::facets;
 use super::level::{Level, Role};
 use super::matrix::{dot_lanes, times_lanes};
 use super::sheets::Sheets;
+use super::surface::Surface;
 use super::tally::Tally;
 use super::{DIVISIONS, WHAT};
 use crate::error::Error;
@@ -78,7 +79,7 @@ const TORN: f32 = 0.0064;
 const CLEAN: f32 = 1e-5;
 
 /// In an exact cloud a surface with more noise than this, in edges and squared, may lie between two sheets.
-const BETWEEN: f32 = 1e-4;
+const BETWEEN: f32 = 3e-4;
 
 /// The cubes of a level, and the surfaces they rest on.
 pub(super) struct Vote<'a> {
@@ -144,6 +145,12 @@ impl<'a> Task<'a> {
             cleanest: (usize::MAX, 0.0),
             resolved: 0,
         }
+    }
+
+    /// Whether a surface that was fitted to a cube lies between two sheets.
+    fn is_between(&mut self, brick: usize, bit: u32, surface: &Surface) -> bool {
+        let Vote { level, .. } = self.vote;
+        self.sheets.find(level, bit, self.around.near(&level.grid, brick, bit, 1), surface)
     }
 
     /// Whether the surface of a cube may lie across an edge of faces that points tell better.
@@ -226,7 +233,11 @@ impl<'a> Task<'a> {
         // Before cubes were divided they have too many points, and what bends is no sheet yet.
         let may_be_between =
             cfg!(feature = "full") && self.vote.exact && division > 0 && !is_edge && own.noise > BETWEEN;
-        if is_edge || smooth.is_some() && !is_torn && !may_be_between {
+        let mut is_between = (!may_be_between).then_some(false);
+        if smooth.is_some() && !is_torn {
+            is_between = is_between.or_else(|| Some(self.is_between(brick, bit, surface)));
+        }
+        if is_edge || smooth.is_some() && !is_torn && is_between == Some(false) {
             for four in placed.chunks(4) {
                 let (places, points) = located(four, centre);
                 let directions = match &smooth {
@@ -237,19 +248,14 @@ impl<'a> Task<'a> {
                 unsafe { self.writer.write_lanes(points, four.len(), directions) };
             }
         } else {
-            let mut is_between = None;
             for p in placed {
                 let place = p.local - centre;
                 let mut facet = None;
                 if is_torn {
                     facet = facets::normal(level, brick, bit, &mut self.around, place);
                 }
-                if facet.is_none() && may_be_between {
-                    let is_between = *is_between.get_or_insert_with(|| {
-                        let near = self.around.near(&level.grid, brick, bit, 1);
-                        self.sheets.find(level, bit, near, surface)
-                    });
-                    facet = is_between.then(|| self.sheets.direction(place));
+                if facet.is_none() && *is_between.get_or_insert_with(|| self.is_between(brick, bit, surface)) {
+                    facet = Some(self.sheets.direction(place));
                 }
                 let direction = facet.unwrap_or_else(|| match &smooth {
                     Some(smooth) => smooth.direction(place),

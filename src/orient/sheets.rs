@@ -22,35 +22,29 @@ const CLEAR: f32 = 0.25;
 /// How often points may change sides.
 const ROUNDS: usize = 8;
 
-/// Whether points lie off one sheet, or one bends both ways.
+/// Whether points lie off one sheet.
 pub(super) struct Doubt {
     count: f32,
-    /// The sum over all points, and that of the squares, of what they lie off a sheet that goes through their mean,
+    /// The sum over all points, and that of the squares, of twice what they lie off a sheet that goes through their mean.
     off: [f32; 2],
-    /// and of what the sheet bends up to there, as their normals tell.
-    bend: [f32; 2],
 }
 
 impl Doubt {
-    pub const NONE: Self = Self { count: 0.0, off: [0.0; 2], bend: [0.0; 2] };
+    pub const NONE: Self = Self { count: 0.0, off: [0.0; 2] };
 
     /// Counts a point that lies so high along the mean normal, and along its own.
     #[inline(always)]
     pub fn add(&mut self, height: f32, own: f32) {
-        let (off, bend) = (height + own, height - own);
+        let off = height + own;
         self.count += 1.0;
         self.off = [self.off[0] + off, self.off[1] + off * off];
-        self.bend = [self.bend[0] + bend, self.bend[1] + bend * bend];
     }
 
-    /// Whether there may be two sheets. Of an even bend along one direction the mean of the squares is 1.8 times the square of
-    /// the mean.
+    /// Whether there may be two sheets.
     pub fn is_some(&self) -> bool {
-        const LEAST: f32 = 2.5e-5;
-        const BOTH_WAYS: f32 = 0.3;
-        let Self { count, off, bend } = *self;
+        const LEAST: f32 = 2e-4;
+        let Self { count, off } = *self;
         count * off[1] - off[0] * off[0] > LEAST * count * count
-            || bend[1] > LEAST * count && bend[0] * bend[0] < BOTH_WAYS * count * bend[1]
     }
 }
 
@@ -75,8 +69,16 @@ pub(super) fn second(points: &[Placed], normals: &[Vec3], normal: Vec3) -> u64 {
     if off(b, a) < APART {
         return 0;
     }
-    let bits = |is_second: &dyn Fn(usize) -> bool| (0..count).map(|i| u64::from(is_second(i)) << i).sum::<u64>();
-    let mut second = bits(&|i| off(i, b) < off(i, a));
+    let (mut second, mut within, mut between) = (0, 0.0, 0.0);
+    for i in 0..count {
+        let (one, other) = (off(i, a), off(i, b));
+        second |= u64::from(other < one) << i;
+        within += one.min(other);
+        between += one.max(other);
+    }
+    if within > CLEAR * between {
+        return 0;
+    }
     for _ in 0..ROUNDS {
         let counts = [count as u32 - second.count_ones(), second.count_ones()];
         if counts[0].min(counts[1]) < LEAST {
