@@ -156,6 +156,21 @@ pub(super) fn thinning(spots: &[Spot], place: DVec3, least_cosine: f64) -> Thinn
     })
 }
 
+/// The share of the variance of densities that a place explains, by the inverse square and the cosine themselves.
+pub(super) fn explained(spots: &[Spot], place: DVec3) -> f64 {
+    let variance = |density: &dyn Fn(&Spot) -> f64| {
+        let (mut sum, mut squares, mut all) = (0.0, 0.0, 0.0);
+        for spot in spots.iter().filter(|spot| Ray::between(spot, place).cosine.abs() >= FACING) {
+            let density = density(spot);
+            sum += spot.weight * density;
+            squares += spot.weight * density * density;
+            all += spot.weight;
+        }
+        squares - sum * sum / all
+    };
+    1.0 - variance(&|spot| spot.density - Ray::between(spot, place).density()) / variance(&|spot| spot.density)
+}
+
 /// Where densities grow to, as a unit vector, and the share of their variance that this explains.
 pub(super) fn growth(spots: &[Spot]) -> (DVec3, f64) {
     let (mut place, mut density, mut all) = (DVec3::ZERO, 0.0, 0.0);

@@ -2,7 +2,7 @@
 
 use super::components::{Decision, Side};
 use super::patches::{Patch, Patches, signed};
-use super::place::{FACING, Place, growth, thinning};
+use super::place::{FACING, Place, explained, growth, thinning};
 use super::signs::Signs;
 use super::spots::{Spot, cubes_of, some_bricks, spots};
 use super::thinning::Thinning;
@@ -29,13 +29,20 @@ const MOST_NEAR: f64 = 1.5;
 /// The share of the variance of densities that is explained, times the power of the cosine that they go with, or one over that if
 /// it is more than 1. Single scans have 0.25 and more, what was scanned from several places also less, and what was covered evenly,
 /// from all sides, or more thinly along an axis, next to nothing.
-const LEAST_CERTAINTY: f64 = 0.12;
+const LEAST_CERTAINTY: f64 = 0.15;
 
 /// How much nearness, twice the logarithm of the distance to base 2, deviates: where all is as far, nothing is told.
 const LEAST_DEPTH: f64 = 0.42;
 
+/// Of open ground distance and slant go together, so that their powers say nothing: if so much is explained by the law itself it
+/// holds, too.
+const ENOUGH: f64 = 0.85;
+
 /// How badly densities may fit: single scans have 0.04 to 0.4, stations that were joined 0.16 to 0.4.
 const MOST_MISFIT: f64 = 0.42;
+
+/// What is closed is a room only if the law holds where densities fit nearly best, of what may be places.
+const NEARLY: f64 = 1.15;
 
 /// The share that may face away, by wrong signs: from the middle, which is only near the scanner, and from where one may have stood.
 const MOST_AWAY: f64 = 0.15;
@@ -50,11 +57,16 @@ const MOST_MIXED: f64 = 0.2;
 const RAYS: usize = 500;
 const LEAST_POINTS: u32 = 4;
 
-/// So near, in edges, a ray still comes out of its own surface.
+/// So near, in edges, a ray still comes out of its own surface; farther than the second it is not followed, as to strays.
 const OWN: f64 = 4.0;
+const REACH: f64 = 1000.0;
 
-/// How much what is hidden speaks against a place, beside what faces away.
-const HIDING: f64 = 2.0;
+/// The share of them that may be hidden.
+const MOST_HIDDEN: f64 = 0.3;
+
+/// By that much less doubt, of misfit and of what faces away or is hidden, the better one of two places on either side of it is
+/// told.
+const CLEAR: f64 = 0.04;
 
 /// Where a scanner stood.
 ///
@@ -71,7 +83,8 @@ pub(super) struct Station {
 impl Station {
     /// That of a cloud, if it is a single scan. One pass over the cubes, and some over a few of them.
     ///
-    /// What is closed has no scanner beside it, and its middle is on no surface: there the law must hold, too.
+    /// What is closed has no scanner beside it, and its middle is on no surface: there the law must hold, too, and where densities
+    /// fit best.
     pub fn of(grid: &Grid, patches: &Patches, signs: &Signs, is_closed: bool) -> Result<Option<Self>, Error> {
         let spots = spots(grid, patches, WHAT)?;
         if spots.len() < LEAST_SPOTS {
@@ -89,20 +102,48 @@ impl Station {
             return Ok(None);
         }
         let samples = samples(grid, patches, signs)?;
-        let (mut station, mut least) = (None, f64::INFINITY);
+        let mut by_law: Option<(f64, Self)> = None;
+        let (mut least_misfit, mut least_by_law) = (f64::INFINITY, f64::INFINITY);
+        let mut explaining = Vec::new();
         for Place { place, misfit, .. } in Place::all(&spots, middle) {
-            let Some(certainty) = law(&spots, place) else { continue };
+            least_misfit = least_misfit.min(misfit);
             let Sides { away, mixed } = Sides::of(&samples, signs.components, place)?;
             let most_away = if place == middle { MOST_AWAY } else { MOST_AWAY_THERE };
             if misfit > MOST_MISFIT || away > most_away || mixed > MOST_MIXED {
                 continue;
             }
-            let doubt = misfit + away.max(HIDING * hidden(grid, patches, &samples, place));
-            if doubt < least {
-                (station, least) = (Some(Self { place, certainty }), doubt);
+            let hidden = hidden(grid, patches, &samples, place);
+            let doubt = misfit + away.max(hidden);
+            if hidden > MOST_HIDDEN {
+                continue;
+            }
+            if let Some(certainty) = law(&spots, place) {
+                least_by_law = least_by_law.min(misfit);
+                if by_law.as_ref().is_none_or(|(least, _)| doubt < *least) {
+                    by_law = Some((doubt, Self { place, certainty }));
+                }
+            } else {
+                grow(&mut explaining, 1, WHAT)?;
+                explaining.push((doubt, Self { place, certainty: explained(&spots, place) }));
             }
         }
-        Ok(station)
+        if let Some((_, station)) = by_law {
+            return Ok((!is_closed || least_by_law <= NEARLY * least_misfit).then_some(station));
+        }
+        explaining.sort_by(|(one, _), (other, _)| one.total_cmp(other));
+        let mut explaining = explaining.into_iter();
+        let Some((least, best)) = explaining.next() else { return Ok(None) };
+        let is_told = !is_closed
+            && best.certainty >= ENOUGH
+            && explaining.all(|(doubt, other)| doubt >= least + CLEAR || !best.is_opposite(&other, &samples));
+        Ok(is_told.then_some(best))
+    }
+
+    /// Whether most of what faces it faces away from another place.
+    fn is_opposite(&self, other: &Self, samples: &[Sample]) -> bool {
+        let side = |station: &Self, sample: &Sample| sample.normal.dot(station.place - sample.place) < 0.0;
+        let opposite = samples.iter().filter(|sample| side(self, sample) != side(other, sample));
+        2 * opposite.count() > samples.len()
     }
 
     /// Turns everything to the scanner, patch by patch.
@@ -221,7 +262,7 @@ fn hidden(grid: &Grid, patches: &Patches, samples: &[Sample], place: DVec3) -> f
             continue;
         }
         // The scanner itself stands in no surface.
-        let steps = (distance - OWN - 1.0) as u32;
+        let steps = (distance - OWN - 1.0).min(REACH) as u32;
         all += 1.0;
         hidden += f64::from((0..steps).any(|i| is_crossed(grid, patches, from + (OWN + f64::from(i)) * step, step)));
     }
