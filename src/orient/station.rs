@@ -27,8 +27,8 @@ const LEAST_NEAR: f64 = 0.5;
 const MOST_NEAR: f64 = 1.5;
 
 /// The share of the variance of densities that is explained, times the power of the cosine that they go with, or one over that if
-/// it is more than 1. Single scans have 0.25 and more, what was scanned from several places also less, and what was covered evenly,
-/// from all sides, or more thinly along an axis, next to nothing.
+/// it is more than 1. Single scans have 0.16 and more, most of them 0.25, what was scanned from several places also less, and what
+/// was covered evenly, from all sides, or more thinly along an axis, next to nothing.
 const LEAST_CERTAINTY: f64 = 0.15;
 
 /// How much nearness, twice the logarithm of the distance to base 2, deviates: where all is as far, nothing is told.
@@ -44,7 +44,8 @@ const MOST_MISFIT: f64 = 0.42;
 /// What is closed is a room only if the law holds where densities fit nearly best, of what may be places.
 const NEARLY: f64 = 1.15;
 
-/// The share that may face away, by wrong signs: from the middle, which is only near the scanner, and from where one may have stood.
+/// The share that may face away, by wrong signs: from the middle, which is only near the scanner, and from where one may have
+/// stood.
 const MOST_AWAY: f64 = 0.15;
 const MOST_AWAY_THERE: f64 = 0.08;
 
@@ -70,8 +71,8 @@ const CLEAR: f64 = 0.04;
 
 /// Where a scanner stood.
 ///
-/// If there is a place by which densities are explained, from which nearly nothing hides another thing, and which nearly all faces
-/// once some surfaces are turned, the cloud is taken for a single scan: also if its surfaces enclose the place, as those of a room
+/// If there is a place by which densities are explained, from which little hides another thing, and which nearly all faces once
+/// some surfaces are turned, the cloud is taken for a single scan: also if its surfaces enclose the place, as those of a room
 /// do and those of an object that was seen from outside, so that nothing else tells the two apart.
 pub(super) struct Station {
     /// In edges.
