@@ -1,4 +1,6 @@
-//! The middle of some values, or what stands at another rank, without sorting them.
+//! The middle of some values, or what stands at another rank, without sorting them; how far values deviate.
+
+use crate::order::sort_few;
 
 /// The median of some values, none of them negative; 0 if there are none.
 pub(crate) fn median(values: &[f32]) -> f32 {
@@ -21,6 +23,21 @@ pub(crate) fn ranked(numbers: impl Iterator<Item = u32> + Clone, rank: usize) ->
     found
 }
 
+/// How far two values and more deviate if they are normally distributed about a few that lie apart, as heights of points about
+/// both sides of a thin wall do, which count twice then: by the median of the gaps between neighbours. Leaves the gaps.
+pub(crate) fn deviation(values: &mut Vec<f32>) -> f32 {
+    /// Of normally distributed values the median of the gaps times their number, in deviations.
+    const GAPS: f32 = 2.2;
+    let count = values.len() as f32;
+    sort_few(values);
+    for i in 1..values.len() {
+        values[i - 1] = values[i] - values[i - 1];
+    }
+    values.pop();
+    sort_few(values);
+    values[values.len() / 2] * count / GAPS
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -30,6 +47,23 @@ mod tests {
         let values: Vec<f32> = (0..101).map(|i| ((i * 37) % 101) as f32 * 1e-9).collect();
         assert_eq!(median(&values), 50.0 * 1e-9);
         assert_eq!((median(&[3.5]), median(&[])), (3.5, 0.0));
+    }
+
+    #[test]
+    fn deviations_are_told_by_gaps() {
+        let mut bits = 1u32;
+        let mut uniform = || {
+            bits = bits.wrapping_mul(0x9E37_79B9).wrapping_add(0x85EB_CA6B);
+            ((bits ^ bits >> 15) >> 8) as f32 / (1 << 24) as f32
+        };
+        // The sum of twelve is nearly normal, of deviation 1.
+        let mut normal = |_| 0.1 * ((0..12).map(|_| uniform()).sum::<f32>() - 6.0);
+        let mut one: Vec<f32> = (0..2000).map(&mut normal).collect();
+        let mut two: Vec<f32> = (0..2000).map(|i| normal(i) + if i % 2 == 0 { 50.0 } else { 0.0 }).collect();
+        for (values, expected) in [(&mut one, 0.1), (&mut two, 0.2)] {
+            let found = deviation(values);
+            assert!((found / expected - 1.0).abs() < 0.25, "{found} is not {expected}");
+        }
     }
 
     #[test]

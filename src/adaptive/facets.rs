@@ -12,6 +12,7 @@ use super::level::Level;
 use super::matrix::dot_lanes;
 use crate::lanes::load;
 use crate::lattice::cube_centre;
+use crate::median;
 use crate::order::sort_few;
 use crate::points::spread;
 use glam::{Vec3, Vec3Swizzles, Vec4};
@@ -58,8 +59,6 @@ const TELLING: usize = 8;
 pub(super) fn are_exact(level: &Level, chosen: &[Chosen]) -> bool {
     /// Bricks to look at.
     const BRICKS: usize = 16;
-    /// Of normally distributed points, the median of the gaps between neighbours times the number of points, in deviations.
-    const GAPS: f32 = 2.2;
     const POINTS: f32 = 32.0;
     let grid = &level.grid;
     let (mut gaps, mut noises) = (Vec::new(), Vec::new());
@@ -71,15 +70,9 @@ pub(super) fn are_exact(level: &Level, chosen: &[Chosen]) -> bool {
             let centre = cube_centre(bit);
             gaps.clear();
             gaps.extend(points.iter().map(|p| chosen[cube].quadric.at(p.local - centre).1));
-            sort_few(&mut gaps);
-            for i in 1..gaps.len() {
-                gaps[i - 1] = gaps[i] - gaps[i - 1];
-            }
-            gaps.pop();
-            sort_few(&mut gaps);
             // In edges of a cube that has as many points as those of the base have.
             let count = points.len() as f32;
-            noises.push((gaps[gaps.len() / 2] * count * (count / POINTS).sqrt(), count));
+            noises.push((median::deviation(&mut gaps) * (count / POINTS).sqrt(), count));
         }
     }
     sort_few(&mut noises);
@@ -88,7 +81,7 @@ pub(super) fn are_exact(level: &Level, chosen: &[Chosen]) -> bool {
         left -= count;
         left <= 0.0
     });
-    rank.is_some_and(|rank| noises[rank].0 < GAPS * EXACT)
+    rank.is_some_and(|rank| noises[rank].0 < EXACT)
 }
 
 /// The normal of the face that a point of a cube, the one with bit `bit` of a brick, lies on, if the points round that tell one.

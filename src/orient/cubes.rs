@@ -5,8 +5,7 @@ use crate::cell::Density;
 use crate::error::Error;
 use crate::grid::{Grid, Placed};
 use crate::lattice::{BRICK, CUBES, Lattice};
-use crate::median::median;
-use crate::order::sort_few;
+use crate::median::{self, median};
 use crate::points::{Bounds, Points, spread};
 use crate::progress::Stage;
 use crate::source::Source;
@@ -86,8 +85,6 @@ fn noise(grid: &Grid, normals: &[Vec3], scale: f32) -> f32 {
 fn deviation(points: &[Placed], normals: &[Vec3], gaps: &mut Vec<f32>) -> Option<f32> {
     /// Fewer points lie on a plane in any case.
     const LEAST: usize = 4;
-    /// Of normally distributed points, the median of the gaps between neighbours times the number of points, in deviations.
-    const GAPS: f32 = 2.2;
     if points.len() < LEAST {
         return None;
     }
@@ -99,11 +96,5 @@ fn deviation(points: &[Placed], normals: &[Vec3], gaps: &mut Vec<f32>) -> Option
     let normal = normal.try_normalize()?;
     gaps.clear();
     gaps.extend(points.iter().map(|point| point.local.dot(normal)));
-    sort_few(gaps);
-    for i in 1..gaps.len() {
-        gaps[i - 1] = gaps[i] - gaps[i - 1];
-    }
-    gaps.pop();
-    sort_few(gaps);
-    Some(gaps[gaps.len() / 2] * points.len() as f32 / GAPS)
+    Some(median::deviation(gaps))
 }
