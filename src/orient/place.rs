@@ -8,7 +8,8 @@ use super::thinning::Thinning;
 use crate::power::log2;
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
-/// What is seen at a flatter angle, by its cosine, tells no density.
+/// What is seen at a flatter angle, by its cosine, tells no density: for the law it does not count, and where a place is sought,
+/// because it may come to face it, it counts as if seen at this one.
 pub(super) const FACING: f64 = 0.15;
 
 /// What lies nearer to the scanner, in edges, lies in it.
@@ -36,11 +37,11 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// Those that fit best near where they are sought; the first is the middle itself.
-    pub fn all(spots: &[Spot], middle: DVec3) -> impl Iterator<Item = Self> {
+    /// Those that fit best near where they are sought; the first is the middle itself. Densities grow `towards` a side.
+    pub fn all(spots: &[Spot], middle: DVec3, towards: DVec3) -> impl Iterator<Item = Self> {
         let unit = spots.iter().map(|spot| spot.place.distance(middle)).sum::<f64>() / spots.len() as f64;
         let across = across(spots, middle, unit);
-        let sought = OFF.map(|off| off * across).into_iter().chain([BESIDE * growth(spots).0]);
+        let sought = OFF.map(|off| off * across).into_iter().chain([BESIDE * towards]);
         let found = sought.map(move |off| Self::at(spots, middle + unit * off).moved(spots, LONGEST * unit));
         [Self::at(spots, middle)].into_iter().chain(found)
     }
@@ -248,7 +249,7 @@ pub(super) mod tests {
 
     /// The one that fits best of those that are found.
     fn best(spots: &[Spot], middle: DVec3) -> Place {
-        Place::all(spots, middle).min_by(|one, other| one.misfit.total_cmp(&other.misfit)).unwrap()
+        Place::all(spots, middle, growth(spots).0).min_by(|one, other| one.misfit.total_cmp(&other.misfit)).unwrap()
     }
 
     #[test]

@@ -38,7 +38,8 @@ const LEAST_DEPTH: f64 = 0.42;
 /// holds, too.
 const ENOUGH: f64 = 0.85;
 
-/// How badly densities may fit: single scans have 0.04 to 0.4, stations that were joined 0.16 to 0.4.
+/// How badly densities may fit: single scans have 0.04 to 0.4, stations that were joined 0.16 to 0.4, and what was covered more
+/// densely at one end often more.
 const MOST_MISFIT: f64 = 0.42;
 
 /// What is closed is a room only if the law holds where densities fit nearly best, of what may be places.
@@ -93,9 +94,10 @@ impl Station {
         }
         let middle = middle(grid);
         let about = thinning(&spots, middle, 0.0);
-        // Not so where nothing tells them, and they are no numbers.
+        // NaN, where nothing tells them, is not.
         let may_be_amid = about.near >= LEAST_NEAR && about.explained >= LEAST_EXPLAINED;
-        let may_be_beside = growth(&spots).1 >= LEAST_EXPLAINED;
+        let (towards, by_growth) = growth(&spots);
+        let may_be_beside = by_growth >= LEAST_EXPLAINED;
         if !may_be_amid && !may_be_beside {
             return Ok(None);
         }
@@ -103,10 +105,9 @@ impl Station {
             return Ok(None);
         }
         let samples = samples(grid, patches, signs)?;
-        let mut by_law: Option<(f64, Self)> = None;
-        let (mut least_misfit, mut least_by_law) = (f64::INFINITY, f64::INFINITY);
-        let mut explaining = Vec::new();
-        for Place { place, misfit, .. } in Place::all(&spots, middle) {
+        let mut least_misfit = f64::INFINITY;
+        let mut candidates = Vec::new();
+        for Place { place, misfit, .. } in Place::all(&spots, middle, towards) {
             least_misfit = least_misfit.min(misfit);
             let Sides { away, mixed } = Sides::of(&samples, signs.components, place)?;
             let most_away = if place == middle { MOST_AWAY } else { MOST_AWAY_THERE };
@@ -114,37 +115,27 @@ impl Station {
                 continue;
             }
             let hidden = hidden(grid, patches, &samples, place);
-            let doubt = misfit + away.max(hidden);
-            if hidden > MOST_HIDDEN {
-                continue;
-            }
-            if let Some(certainty) = law(&spots, place) {
-                least_by_law = least_by_law.min(misfit);
-                if by_law.as_ref().is_none_or(|(least, _)| doubt < *least) {
-                    by_law = Some((doubt, Self { place, certainty }));
-                }
-            } else {
-                grow(&mut explaining, 1, WHAT)?;
-                explaining.push((doubt, Self { place, certainty: explained(&spots, place) }));
+            if hidden <= MOST_HIDDEN {
+                grow(&mut candidates, 1, WHAT)?;
+                candidates.push(Candidate { place, misfit, doubt: misfit + away.max(hidden), law: law(&spots, place) });
             }
         }
-        if let Some((_, station)) = by_law {
-            return Ok((!is_closed || least_by_law <= NEARLY * least_misfit).then_some(station));
-        }
-        explaining.sort_by(|(one, _), (other, _)| one.total_cmp(other));
-        let mut explaining = explaining.into_iter();
-        let Some((least, best)) = explaining.next() else { return Ok(None) };
-        let is_told = !is_closed
-            && best.certainty >= ENOUGH
-            && explaining.all(|(doubt, other)| doubt >= least + CLEAR || !best.is_opposite(&other, &samples));
-        Ok(is_told.then_some(best))
-    }
-
-    /// Whether most of what faces it faces away from another place.
-    fn is_opposite(&self, other: &Self, samples: &[Sample]) -> bool {
-        let side = |station: &Self, sample: &Sample| sample.normal.dot(station.place - sample.place) < 0.0;
-        let opposite = samples.iter().filter(|sample| side(self, sample) != side(other, sample));
-        2 * opposite.count() > samples.len()
+        let best = |by_law: bool| {
+            let candidates = candidates.iter().filter(|one| one.law.is_some() == by_law);
+            candidates.min_by(|one, other| one.doubt.total_cmp(&other.doubt))
+        };
+        let found = if let Some(best) = best(true) {
+            let is_room = candidates.iter().any(|one| one.law.is_some() && one.misfit <= NEARLY * least_misfit);
+            best.law.filter(|_| !is_closed || is_room).map(|certainty| (best, certainty))
+        } else if let Some(best) = best(false) {
+            let is_told = |other: &Candidate| other.doubt >= best.doubt + CLEAR || !best.is_opposite(other, &samples);
+            let certainty = explained(&spots, best.place);
+            let is_scan = !is_closed && certainty >= ENOUGH && candidates.iter().all(is_told);
+            is_scan.then_some((best, certainty))
+        } else {
+            None
+        };
+        Ok(found.map(|(best, certainty)| Self { place: best.place, certainty }))
     }
 
     /// Turns everything to the scanner, patch by patch.
@@ -175,6 +166,25 @@ impl Station {
     }
 }
 
+/// A place that nearly all faces, and from which little is hidden.
+struct Candidate {
+    place: DVec3,
+    misfit: f64,
+    /// That, and the share that faces away or is hidden.
+    doubt: f64,
+    /// How certain it is by the law.
+    law: Option<f64>,
+}
+
+impl Candidate {
+    /// Whether most of what faces it faces away from another place.
+    fn is_opposite(&self, other: &Self, samples: &[Sample]) -> bool {
+        let side = |one: &Self, sample: &Sample| sample.normal.dot(one.place - sample.place) < 0.0;
+        let opposite = samples.iter().filter(|sample| side(self, sample) != side(other, sample));
+        2 * opposite.count() > samples.len()
+    }
+}
+
 /// Near the scanner, if it is a scan: of points at the same angles from each other the mean, where the near ones count more.
 fn middle(grid: &Grid) -> DVec3 {
     let (mut sum, mut all) = (DVec3::ZERO, 0.0);
@@ -192,7 +202,7 @@ fn middle(grid: &Grid) -> DVec3 {
 fn law(spots: &[Spot], place: DVec3) -> Option<f64> {
     let Thinning { near, slant, depth, explained, .. } = thinning(spots, place, FACING);
     let certainty = explained * slant.min(1.0 / slant);
-    // Not so where nothing tells them, and they are no numbers.
+    // NaN, where nothing tells them, is none.
     let is_scan = (LEAST_NEAR..=MOST_NEAR).contains(&near) && depth >= LEAST_DEPTH && certainty >= LEAST_CERTAINTY;
     is_scan.then_some(certainty)
 }
@@ -262,7 +272,7 @@ fn hidden(grid: &Grid, patches: &Patches, samples: &[Sample], place: DVec3) -> f
         if sample.points < LEAST_POINTS || sample.normal.dot(step).abs() < FACING {
             continue;
         }
-        // The scanner itself stands in no surface.
+        // Not as far as the scanner itself.
         let steps = (distance - OWN - 1.0).min(REACH) as u32;
         all += 1.0;
         hidden += f64::from((0..steps).any(|i| is_crossed(grid, patches, from + (OWN + f64::from(i)) * step, step)));

@@ -7,7 +7,7 @@ pub(super) struct Thinning {
     /// Densities it was fitted to, by their weights.
     pub count: f64,
     pub near: f64,
-    /// The standard error of that.
+    /// The standard error of that, if all weights are 1.
     pub error: f64,
     pub slant: f64,
     /// The standard deviation of nearness, besides what goes with slantedness.
