@@ -661,6 +661,65 @@ fn open_ground_faces_the_scanner() {
     }
 }
 
+/// The first place on a ray, no farther than 20, of level ground at 0 with two boxes on it, and the normal there.
+fn first_on_a_yard(from: [f64; 3], along: [f64; 3]) -> Option<([f64; 3], [f64; 3])> {
+    const BOXES: [([f64; 3], [f64; 3]); 2] =
+        [([4.0, 2.0, 0.0], [7.0, 5.0, 2.5]), ([-6.0, -3.0, 0.0], [-4.5, 1.0, 1.0])];
+    let mut first = (20.0, [0.0; 3]);
+    if along[2] < 0.0 && -from[2] / along[2] < first.0 {
+        first = (-from[2] / along[2], [0.0, 0.0, 1.0]);
+    }
+    for (low, high) in BOXES {
+        let ends = [0, 1, 2].map(|axis| [low, high].map(|end| (end[axis] - from[axis]) / along[axis]));
+        let entries = ends.map(|[one, other]| f64::min(one, other));
+        let entry = entries.into_iter().fold(f64::MIN, f64::max);
+        let exit = ends.map(|[one, other]| f64::max(one, other)).into_iter().fold(f64::MAX, f64::min);
+        if entry > 0.0 && entry < exit && entry < first.0 {
+            let normal = [0, 1, 2].map(|axis| if entries[axis] == entry { -along[axis].signum() } else { 0.0 });
+            first = (entry, normal);
+        }
+    }
+    let place = [0, 1, 2].map(|axis| from[axis] + first.0 * along[axis]);
+    (first.1 != [0.0; 3]).then_some((place, first.1))
+}
+
+/// On level ground distance and slant go together; what stands on it tells from which side it was seen.
+#[test]
+fn level_ground_faces_the_scanner() {
+    for (seed, height) in [(94, 1.7), (95, 1.2), (96, 2.3)] {
+        for noise in [0.0, 0.0003] {
+            let from = [0.0, 0.0, height];
+            let mut random = Random(seed);
+            let samples = std::iter::from_fn(|| Some(random.direction()))
+                .filter(|along| along[2] > -0.9)
+                .filter_map(|along| first_on_a_yard(from, along));
+            let cloud = Cloud::of(samples.take(60_000).map(|(p, n)| (turn(p), turn(n)))).noisy(noise, 5);
+            let result = orient(&cloud.points, Orient::Consistent);
+            let right = share_right(&result.normals, &cloud.normals);
+            assert!(right > 0.995, "{height}, {noise}: {right}, {:?}", components(&result));
+        }
+    }
+}
+
+/// A closed body that was covered more densely on one side, as by more looks at what matters, is no room.
+#[test]
+fn bodies_refined_on_one_side_face_outwards() {
+    for (seed, times) in [(97, 3.0), (98, 10.0), (99, 30.0)] {
+        let mut random = Random(seed);
+        let samples = std::iter::from_fn(|| {
+            let d = random.direction();
+            // Within 40 degrees of its longest axis so many times as many.
+            let is_taken = random.unit() * times < if d[0] > 0.77 { times } else { 1.0 };
+            let (p, n) = ([2.0 * d[0], 1.3 * d[1], d[2]], [d[0] / 2.0, d[1] / 1.3, d[2]]);
+            let length = n.iter().map(|c| c * c).sum::<f64>().sqrt();
+            Some(is_taken.then(|| (p, n.map(|c| c / length))))
+        });
+        let cloud = Cloud::of(samples.flatten().take(60_000).map(|(p, n)| (turn(p), turn(n))));
+        let result = orient(&cloud.points, Orient::Consistent);
+        assert_eq!(share_right(&result.normals, &cloud.normals), 1.0, "{times}: {:?}", components(&result));
+    }
+}
+
 /// A floor is seen from one side, and a ball over it from all.
 #[test]
 fn what_was_scanned_all_round_is_no_part_of_a_view() {

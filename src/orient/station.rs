@@ -68,7 +68,7 @@ const MOST_HIDDEN: f64 = 0.3;
 
 /// By that much less doubt, of misfit and of what faces away or is hidden, the better one of two places on either side of it is
 /// told.
-const CLEAR: f64 = 0.04;
+const CLEAR: f64 = 0.03;
 
 /// Where a scanner stood.
 ///
@@ -281,7 +281,7 @@ fn hidden(grid: &Grid, patches: &Patches, samples: &[Sample], place: DVec3) -> f
     if all > 0.0 { hidden / all } else { 1.0 }
 }
 
-/// Whether a step of an edge, half before a place and half behind it, crosses a patch in the cube there.
+/// Whether a ray crosses a patch of the cube of a place on it, no more than a step of an edge before or behind that.
 fn is_crossed(grid: &Grid, patches: &Patches, place: DVec3, step: DVec3) -> bool {
     let cube = place.floor().as_ivec3();
     let brick = cube >> BRICK.trailing_zeros();
@@ -292,8 +292,10 @@ fn is_crossed(grid: &Grid, patches: &Patches, place: DVec3, step: DVec3) -> bool
     is_occupied
         && patches.all[patches.of_cube(grid.cube(number, bit) as usize)].iter().any(|patch: &Patch| {
             let normal = patch.normal.as_dvec3();
-            let off = normal.dot(within - patch.centre.as_dvec3());
-            patch.points >= LEAST_POINTS && 2.0 * off.abs() <= normal.dot(step).abs()
+            let steps = normal.dot(patch.centre.as_dvec3() - within) / normal.dot(step);
+            // And a little, for what lies on a face of it.
+            let is_there = (within + steps * step).abs().max_element() <= 0.51;
+            patch.points >= LEAST_POINTS && steps.abs() <= 1.0 && is_there
         })
 }
 
@@ -301,6 +303,11 @@ fn is_crossed(grid: &Grid, patches: &Patches, place: DVec3, step: DVec3) -> bool
 mod tests {
     use super::super::place::tests::{STOOD, seen_from, walls};
     use super::*;
+    use crate::lattice::{CUBES, Lattice};
+    use crate::points::{Bounds, Points};
+    use crate::progress::Progress;
+    use crate::source::Source;
+    use glam::{DVec2, Vec3};
 
     #[test]
     fn densities_tell_where_a_scanner_stood() {
@@ -340,5 +347,42 @@ mod tests {
         // From beside the box the wall next to the place faces away from it.
         let Sides { away, .. } = sides(DVec3::new(50.0, 0.0, 0.0), |_| (0, false));
         assert!(is_near(away, 1.0 / 6.0), "{away}");
+    }
+
+    /// A level plane of points with 40 cubes along an edge, and its patches.
+    fn plane() -> (Grid, Patches) {
+        let at = |i: usize| 0.25 * (i as f32 + 0.5);
+        let coordinates: Vec<f32> = (0..160 * 160).flat_map(|i| [at(i % 160), at(i / 160), 0.3]).collect();
+        let points = Points::from_f32(&coordinates).unwrap();
+        let lattice = Lattice::new(&Bounds::of(&points), &|| DVec3::ZERO, 1.0, CUBES);
+        let stage = Progress::silent();
+        let stage = stage.stage("test", 0.0..1.0);
+        let (grid, _) = Grid::sort(&Source::new(&points, lattice), &stage, |_, _| ()).unwrap();
+        let (patches, _) = Patches::of(&grid, &vec![Vec3::Z; 160 * 160], 0.0, &stage).unwrap();
+        (grid, patches)
+    }
+
+    #[test]
+    fn a_plane_hides_what_is_behind_it() {
+        let (grid, patches) = plane();
+        let (_, middle) =
+            patches.places(&grid).find(|(_, place)| place.truncate().floor() == DVec2::splat(20.0)).unwrap();
+        let samples = |height: f64, points: u32| {
+            let place = |i: i32| middle + DVec3::new(f64::from(i % 5), f64::from(i / 5), height);
+            let sample = |i| Sample { place: place(i), normal: DVec3::Z, points, component: 0 };
+            (0..25).map(sample).collect::<Vec<_>>()
+        };
+        let above = middle + DVec3::new(3.0, -2.0, 9.0);
+        let hidden = |samples: &[Sample], place: DVec3| hidden(&grid, &patches, samples, place);
+        // But for a ray through the corners of cubes, which no step comes to.
+        assert!(hidden(&samples(-9.0, 8), above) > 0.9);
+        // In front of it, on it, seen from its own side, and past its end.
+        assert_eq!(hidden(&samples(3.0, 8), above), 0.0);
+        assert_eq!(hidden(&samples(0.0, 8), above), 0.0);
+        assert_eq!(hidden(&samples(-9.0, 8), middle - DVec3::new(3.0, -2.0, 20.0)), 0.0);
+        assert_eq!(hidden(&samples(-9.0, 8), middle + DVec3::new(400.0, 0.0, 99.0)), 0.0);
+        // Of too few points, and all of it too flat.
+        assert_eq!(hidden(&samples(-9.0, 3), above), 1.0);
+        assert_eq!(hidden(&samples(3.0, 8), middle + DVec3::new(400.0, 0.0, 3.0)), 1.0);
     }
 }
