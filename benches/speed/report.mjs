@@ -103,7 +103,7 @@ export function report(rows, drop, runs) {
   return `${paragraphs(
     '# Speed, measured',
     'Written by `npm run bench`, text and all; not to be edited.',
-    `${model}, ${cores} cores, Node ${node}, ${date}; medians of ${runs} runs. Spheres are evenly covered, their points in random order or sorted (Morton), so that neighbours in space are neighbours in memory. Cell is \`'auto'\` or a multiple of the paper's L.`,
+    `${model}, ${cores} cores, Node ${node}, ${date}; medians of ${runs} runs, of WebAssembly after a second of others. Spheres are evenly covered, their points in random order or sorted (Morton), so that neighbours in space are neighbours in memory. Cell is \`'auto'\` or a multiple of the paper's L.`,
     '“ms” is what the caller waits for, in WebAssembly with the copies in and out; native code takes the input as it lies. “Spread” is half of what lies between the fastest run and the slowest. “Copies” is how often that is the time of the bare copies, 12 bytes a point into wasm memory and 12 out of it, between arrays that are in use, by one thread. “Bytes/point” is the peak of the engine’s memory, input and normals included. The phases are in milliseconds.',
     drop &&
       `The page, opened anew for each run and given some seconds, with a PLY file of ${drop.points / 1e6} million points with colours: ${drop.whole.toFixed(0)} ms from the choice of the file until its normals were handed to WebGL; the same estimate alone, with signs, ${drop.estimate.toFixed(0)} ms. Drawing is switched off, for it would run on the processors.`,

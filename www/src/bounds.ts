@@ -14,7 +14,7 @@ export interface Bounds {
 }
 
 /** Points looked at for quantiles; the reach looks at every point. */
-const SAMPLE = 60_000;
+const SAMPLE = 20_000;
 /** Share of the points that may lie outside of the bulk, at each end of each axis. */
 const STRAY = 0.005;
 
