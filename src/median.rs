@@ -12,11 +12,16 @@ pub(crate) fn median(values: &[f32]) -> f32 {
 /// has bits, however many are alike. The library's selection takes the square of their number for such, as the modules have
 /// its small one.
 pub(crate) fn ranked(numbers: impl Iterator<Item = u32> + Clone, rank: usize) -> u32 {
-    let bits = u32::BITS - numbers.clone().max().unwrap_or(0).leading_zeros();
+    ranked_runs(numbers.map(|number| (number, 1)), rank)
+}
+
+/// The same of numbers of which each comes with how often it is there.
+pub(crate) fn ranked_runs(runs: impl Iterator<Item = (u32, usize)> + Clone, rank: usize) -> u32 {
+    let bits = u32::BITS - runs.clone().map(|(number, _)| number).max().unwrap_or(0).leading_zeros();
     let mut found = 0;
     for bit in (0..bits).rev() {
         let more = found | 1 << bit;
-        if numbers.clone().filter(|&number| number < more).count() <= rank {
+        if runs.clone().filter(|&(number, _)| number < more).map(|(_, count)| count).sum::<usize>() <= rank {
             found = more;
         }
     }

@@ -935,6 +935,43 @@ fn a_stray_point_turns_nothing() {
     }
 }
 
+/// Echoes from far off, of birds or of what a mirror shows, close together or scattered: up to one point in fifty.
+fn strays(count: usize, distance: f64, spread: f64, seed: u64) -> Vec<f32> {
+    let mut random = Random(seed);
+    let middle = random.direction().map(|c| distance * c);
+    let stray = |_| {
+        let (along, far) = (random.direction(), random.unit().sqrt());
+        [0, 1, 2].map(|axis| (middle[axis] + spread * far * along[axis]) as f32)
+    };
+    (0..count).flat_map(stray).collect()
+}
+
+#[test]
+fn strays_turn_nothing() {
+    let mut random = Random(61);
+    let from = [1.2, -0.9, 0.5];
+    let room =
+        Cloud::of((0..20_000).map(|_| first_in_a_room(from, random.direction())).map(|(p, n)| (turn(p), turn(n))));
+    let hills = std::iter::from_fn(|| Some(first_on_hills([0.0, 0.0, hills(0.0, 0.0) + 1.7], random.direction())));
+    let hills = Cloud::of(hills.flatten().take(20_000).map(|(p, n)| (turn(p), turn(n))));
+    let ball = sphere(20_000, 62);
+    let view = view_of(&[([0.0, 0.0, 0.0], 1.0), ([1.5, 0.5, -1.0], 0.7)], 20_000);
+    for (name, cloud, size) in [("room", room, 3.0), ("hills", hills, 30.0), ("ball", ball, 1.0), ("view", view, 2.0)] {
+        for (count, distance, spread) in
+            [(1, 100.0, 0.0), (12, 30.0, 0.02), (12, 2000.0, 0.02), (400, 4.0, 0.3), (400, 40.0, 0.1), (400, 0.0, 60.0)]
+        {
+            let strays = strays(count, size * distance, size * spread, 63);
+            let result = orient(&[&cloud.points[..], &strays].concat(), Orient::Consistent);
+            let right = share_right(&result.normals[..cloud.points.len()], &cloud.normals);
+            assert!(
+                right > 0.99,
+                "{name}, {count} at {distance} within {spread}: {right}, {:?}",
+                components(&result)[0]
+            );
+        }
+    }
+}
+
 /// Of a normal and its oriented one: whether nothing but the sign may have changed.
 fn is_same_line(oriented: &[f32], plain: &[f32]) -> bool {
     assert!(oriented.iter().all(|c| !(*c == 0.0 && c.is_sign_negative())), "{oriented:?}");

@@ -1,6 +1,8 @@
 //! Which side of a patch is open to the air.
 
+use super::ball::Ball;
 use super::patches::{Patch, Patches, signed};
+use super::spots::bricks_in;
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
@@ -74,8 +76,14 @@ impl Sights {
 /// the end of the box is occupied. Each direction is one sweep over the bits of all voxels, 64 at a time. After the votes on
 /// facets of Takayama, Jacobson, Kavan and Sorkine-Hornung, "A simple method for correcting facet orientations in polygon
 /// meshes based on ray casting", 2014.
-pub(super) fn sights(grid: &Grid, patches: &Patches, points: usize, stage: &Stage) -> Result<Sights, Error> {
-    let voxels = Voxels::of(grid, points)?;
+pub(super) fn sights(
+    ball: &Ball,
+    grid: &Grid,
+    patches: &Patches,
+    points: usize,
+    stage: &Stage,
+) -> Result<Sights, Error> {
+    let voxels = Voxels::of(ball, grid, points)?;
     let mut seen: Vec<AtomicU32> = Vec::new();
     reserve(&mut seen, grid.cubes(), WHAT)?;
     seen.resize_with(grid.cubes(), AtomicU32::default);
@@ -162,14 +170,14 @@ struct Voxels {
 }
 
 impl Voxels {
-    fn of(grid: &Grid, points: usize) -> Result<Self, Error> {
+    fn of(ball: &Ball, grid: &Grid, points: usize) -> Result<Self, Error> {
         // Two bytes a point, and no less than is done at once.
         let most = (16.0 * points as f64).max(4e6);
         let volume = |size: IVec3| f64::from((size.x + 63) & !63) * f64::from(size.y) * f64::from(size.z);
-        let (mut first, mut size) = box_round(&grid.bricks.places, 0.0);
+        let (mut first, mut size) = box_round(grid.bricks.places.iter().copied(), 0.0);
         if volume(size) > most {
             // Without what strays; that is not asked, and hides nothing.
-            (first, size) = box_round(&grid.bricks.places, STRAY);
+            (first, size) = box_round(bricks_in(ball, grid).map(|brick| grid.bricks.places[brick]), STRAY);
         }
         let (cubes, mut doublings) = (size, 0);
         while volume(size) > most {
@@ -316,15 +324,12 @@ fn shifted(row: &[u64], dx: i32, to: &mut [u64]) {
 const STRAY: f64 = 0.005;
 
 /// The first cube, and the size in cubes, of a box round all bricks but a share at each end of each axis.
-fn box_round(bricks: &[IVec3], share: f64) -> (IVec3, IVec3) {
-    if bricks.is_empty() {
-        return (IVec3::ZERO, IVec3::ZERO);
-    }
-    let last = (bricks.len() - 1) as f64;
+fn box_round(bricks: impl Iterator<Item = IVec3> + Clone, share: f64) -> (IVec3, IVec3) {
+    let Some(last) = bricks.clone().count().checked_sub(1) else { return (IVec3::ZERO, IVec3::ZERO) };
     let [low, high] = [share, 1.0 - share].map(|quantile| {
-        let rank = (last * quantile).round() as usize;
+        let rank = (last as f64 * quantile).round() as usize;
         // No place is negative.
-        IVec3::from_array([0, 1, 2].map(|axis| ranked(bricks.iter().map(|brick| brick[axis] as u32), rank) as i32))
+        IVec3::from_array([0, 1, 2].map(|axis| ranked(bricks.clone().map(|brick| brick[axis] as u32), rank) as i32))
     });
     (BRICK * low, BRICK * (high - low + 1))
 }

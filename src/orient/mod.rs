@@ -8,6 +8,7 @@
 //! In noise normals then become means of those about them ([`means`]).
 
 mod air;
+mod ball;
 mod components;
 mod cubes;
 mod facing;
@@ -35,6 +36,7 @@ use crate::parallel::{self, Scatter};
 use crate::points::{Bounds, CHUNK, Points};
 use crate::progress::Stage;
 use air::Sights;
+use ball::Ball;
 use components::decide;
 use cubes::Cubes;
 use glam::{DVec3, Vec3};
@@ -121,18 +123,21 @@ fn surfaces(
     let (patches, members) = Patches::of(grid, normals, *noise, &stage.part(0.35..0.5))?;
     // Half of all the memory, and only its order is needed from here on.
     grid.placed = Vec::new();
-    let sights = air::sights(grid, &patches, points.len(), &stage.part(0.5..0.55))?;
+    let ball = Ball::of(grid);
+    let sights = air::sights(&ball, grid, &patches, points.len(), &stage.part(0.5..0.55))?;
     let links = Links::of(grid, &patches, *noise, &stage.part(0.55..0.7))?;
     let groups = Groups::of(links, &sights, &patches, &stage.part(0.7..0.85))?;
     let choosing = stage.part(0.85..0.9);
     let (mut signs, looks, scanner) = match options.orient {
         Orient::Outward => (Signs::outward(groups, &choosing)?, None, None),
-        _ => consistent(groups, grid, &patches, *noise, &sights, &choosing)?,
+        _ => consistent(groups, &ball, grid, &patches, *noise, &sights, &choosing)?,
     };
     let mut decisions = decide(grid, &patches, &sights, &mut signs)?;
     match scanner {
         Some(Scanner::At(station)) => station.turn_to_it(grid, &patches, &mut signs, &mut decisions)?,
-        Some(Scanner::Towards(view)) => view.turn_to_it(grid, &patches, looks.as_ref(), &mut signs, &mut decisions)?,
+        Some(Scanner::Towards(view)) => {
+            view.turn_to_it(&ball, grid, &patches, looks.as_ref(), &mut signs, &mut decisions)?
+        }
         None if options.orient == Orient::Consistent => {
             let facing = stage.part(0.9..0.95);
             facing::turn_to_what_looks(grid, &patches, &sights, looks, &mut signs, &mut decisions, &facing)?;
@@ -162,19 +167,20 @@ enum Scanner {
 /// there is anything that is not closed, and the scanner, if there was one.
 fn consistent(
     groups: Groups,
+    ball: &Ball,
     grid: &Grid,
     patches: &Patches,
     noise: f32,
     sights: &Sights,
     stage: &Stage,
 ) -> Result<(Signs, Option<Looks>, Option<Scanner>), Error> {
-    let mut choice = Choice::of(groups, sights, &stage.part(0.0..0.3))?;
+    let mut choice = Choice::of(groups, patches, sights, &stage.part(0.0..0.3))?;
     let mut looks = None;
-    if !choice.is_all_closed() {
+    if choice.is_any_open() {
         looks = Some(Looks::from_the_open(grid, patches, sights)?);
         choice.be_cautious(None, sights, &stage.part(0.3..0.5))?;
     }
-    let scanner = match Station::of(grid, patches, choice.signs(), choice.is_all_closed())? {
+    let scanner = match Station::of(ball, grid, patches, choice.signs(), choice.is_all_closed())? {
         Some(station) => Some(Scanner::At(station)),
         None => View::of(grid, patches, noise, choice.signs(), &stage.part(0.5..0.6))?.map(Scanner::Towards),
     };

@@ -1,9 +1,10 @@
 //! How much the open air counts against the edges of a surface, and the signs that come of it.
 
 use super::air::Sights;
+use super::ball::STRAYS;
 use super::groups::Groups;
 use super::looks::Looks;
-use super::patches::signed;
+use super::patches::{Patches, signed};
 use crate::error::Error;
 use crate::lists::{filled, fitted};
 use crate::progress::Stage;
@@ -43,19 +44,32 @@ pub(super) struct Choice {
     signs: Signs,
     /// For each component whether it is closed, or small.
     is_closed: Vec<bool>,
+    /// Whether all are that but what may stray.
+    is_all_closed: bool,
 }
 
 impl Choice {
     /// Counts all that lies in the open.
-    pub fn of(groups: Groups, sights: &Sights, stage: &Stage) -> Result<Self, Error> {
+    pub fn of(groups: Groups, patches: &Patches, sights: &Sights, stage: &Stage) -> Result<Self, Error> {
         let flipped = groups.signs(stage)?;
         let is_closed = closed(&groups, sights, &flipped)?;
+        let (mut open, mut all) = (0.0, 0.0);
+        for (patch, &component) in patches.all.iter().zip(&groups.component) {
+            let points = f64::from(patch.points);
+            all += points;
+            open += if is_closed[component as usize] { 0.0 } else { points };
+        }
         let signs = Signs { flipped, components: groups.components(), component: fitted(&groups.component, WHAT)? };
-        Ok(Self { groups, signs, is_closed })
+        Ok(Self { groups, signs, is_closed, is_all_closed: open <= STRAYS * all })
     }
 
     pub fn is_all_closed(&self) -> bool {
-        !self.is_closed.contains(&false)
+        self.is_all_closed
+    }
+
+    /// Whether there is anything that is not closed, nor small.
+    pub fn is_any_open(&self) -> bool {
+        self.is_closed.contains(&false)
     }
 
     /// Counts a share, for components that are not closed, nor small, beside the looks of their patches at each other, if any.

@@ -1,5 +1,6 @@
 //! How densely the surfaces all over a cloud are covered.
 
+use super::ball::Ball;
 use super::patches::{Patch, Patches};
 use crate::bricks::set_bits;
 use crate::error::Error;
@@ -36,9 +37,16 @@ pub(super) struct Spot {
     pub weight: f64,
 }
 
-/// The numbers of some bricks, all over the cloud.
-pub(super) fn some_bricks(grid: &Grid) -> impl Iterator<Item = usize> {
-    spread(grid.bricks.len(), BRICKS)
+/// The numbers of the bricks that are not far off.
+pub(super) fn bricks_in<'a>(ball: &'a Ball, grid: &'a Grid) -> impl Iterator<Item = usize> + Clone + 'a {
+    (0..grid.bricks.len()).filter(|&brick| ball.holds(f64::from(BRICK) * (grid.bricks.places[brick].as_dvec3() + 0.5)))
+}
+
+/// Some of them, all over the cloud.
+pub(super) fn some_bricks<'a>(ball: &'a Ball, grid: &'a Grid) -> impl Iterator<Item = usize> + 'a {
+    let mut some = spread(bricks_in(ball, grid).count(), BRICKS).peekable();
+    let all = bricks_in(ball, grid).enumerate();
+    all.filter_map(move |(i, brick)| some.next_if_eq(&i).map(|_| brick))
 }
 
 /// The occupied cubes of a brick: the middle of each, in edges, its number, and its bit.
@@ -49,9 +57,9 @@ pub(super) fn cubes_of(grid: &Grid, brick: usize) -> impl Iterator<Item = (DVec3
 }
 
 /// Those of some bricks.
-pub(super) fn spots(grid: &Grid, patches: &Patches, what: &'static str) -> Result<Vec<Spot>, Error> {
+pub(super) fn spots(ball: &Ball, grid: &Grid, patches: &Patches, what: &'static str) -> Result<Vec<Spot>, Error> {
     let mut spots = Vec::new();
-    for brick in some_bricks(grid) {
+    for brick in some_bricks(ball, grid) {
         grow(&mut spots, 8, what)?;
         spots.extend((0..8).filter_map(|octant| {
             let is_in_it = |&(_, _, bit): &(DVec3, usize, u32)| bit >> 1 & 1 | bit >> 2 & 2 | bit >> 3 & 4 == octant;

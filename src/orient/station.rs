@@ -1,10 +1,11 @@
 //! Clouds that one scanner took, and not from far: all their surfaces face the place where it stood.
 
+use super::ball::Ball;
 use super::components::{Decision, Side};
 use super::patches::{Patch, Patches, signed};
 use super::place::{FACING, Place, explained, growth, thinning};
 use super::signs::Signs;
-use super::spots::{Spot, cubes_of, some_bricks, spots};
+use super::spots::{Spot, bricks_in, cubes_of, some_bricks, spots};
 use super::thinning::Thinning;
 use crate::error::Error;
 use crate::grid::Grid;
@@ -87,12 +88,18 @@ impl Station {
     ///
     /// What is closed has no scanner beside it, and its middle is on no surface: there the law must hold, too, and where densities
     /// fit best.
-    pub fn of(grid: &Grid, patches: &Patches, signs: &Signs, is_closed: bool) -> Result<Option<Self>, Error> {
-        let spots = spots(grid, patches, WHAT)?;
+    pub fn of(
+        ball: &Ball,
+        grid: &Grid,
+        patches: &Patches,
+        signs: &Signs,
+        is_closed: bool,
+    ) -> Result<Option<Self>, Error> {
+        let spots = spots(ball, grid, patches, WHAT)?;
         if spots.len() < LEAST_SPOTS {
             return Ok(None);
         }
-        let middle = middle(grid);
+        let middle = middle(ball, grid);
         let about = thinning(&spots, middle, 0.0);
         // NaN, where nothing tells them, is not.
         let may_be_amid = about.near >= LEAST_NEAR && about.explained >= LEAST_EXPLAINED;
@@ -104,7 +111,7 @@ impl Station {
         if is_closed && law(&spots, middle).is_none() {
             return Ok(None);
         }
-        let samples = samples(grid, patches, signs)?;
+        let samples = samples(ball, grid, patches, signs)?;
         let mut least_misfit = f64::INFINITY;
         let mut candidates = Vec::new();
         for Place { place, misfit, .. } in Place::all(&spots, middle, towards) {
@@ -186,9 +193,9 @@ impl Candidate {
 }
 
 /// Near the scanner, if it is a scan: of points at the same angles from each other the mean, where the near ones count more.
-fn middle(grid: &Grid) -> DVec3 {
+fn middle(ball: &Ball, grid: &Grid) -> DVec3 {
     let (mut sum, mut all) = (DVec3::ZERO, 0.0);
-    for (place, cube, _) in (0..grid.bricks.len()).flat_map(|brick| cubes_of(grid, brick)) {
+    for (place, cube, _) in bricks_in(ball, grid).flat_map(|brick| cubes_of(grid, brick)) {
         let points = grid.points_of(cube).len() as f64;
         let weight = points * points.sqrt();
         sum += weight * place;
@@ -218,9 +225,9 @@ struct Sample {
 }
 
 /// The patches of some bricks.
-fn samples(grid: &Grid, patches: &Patches, signs: &Signs) -> Result<Vec<Sample>, Error> {
+fn samples(ball: &Ball, grid: &Grid, patches: &Patches, signs: &Signs) -> Result<Vec<Sample>, Error> {
     let mut samples = Vec::new();
-    for (centre, cube, _) in some_bricks(grid).flat_map(|brick| cubes_of(grid, brick)) {
+    for (centre, cube, _) in some_bricks(ball, grid).flat_map(|brick| cubes_of(grid, brick)) {
         let own = patches.of_cube(cube);
         grow(&mut samples, own.len(), WHAT)?;
         samples.extend(own.map(|number| {

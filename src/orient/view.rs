@@ -1,5 +1,6 @@
 //! Clouds that were seen from one side: all their surfaces face the scanner.
 
+use super::ball::{Ball, STRAYS};
 use super::components::{Decision, Side, is_below};
 use super::looks::{Looks, Votes};
 use super::patches::{Patch, Patches, signed};
@@ -123,6 +124,7 @@ impl View {
     /// normals is turned by convention.
     pub fn turn_to_it(
         &self,
+        ball: &Ball,
         grid: &Grid,
         patches: &Patches,
         looks: Option<&Looks>,
@@ -132,9 +134,11 @@ impl View {
         let turned = self.turned(patches, signs)?;
         let told = bulge(decisions, &turned) / CLEAR_BULGE
             + looking(looks, signs, decisions, &turned) / CLEAR_LOOKING
-            + (self.density(grid, patches) / CLEAR_DENSITY).clamp(-MOST_BY_DENSITY, MOST_BY_DENSITY);
+            + (self.density(ball, grid, patches) / CLEAR_DENSITY).clamp(-MOST_BY_DENSITY, MOST_BY_DENSITY);
         let is_guess = told.abs() < GUESS;
-        if is_guess && decisions.len() == 1 {
+        let all: u64 = decisions.iter().map(|decision| decision.component.points).sum();
+        let is_one_surface = decisions[0].component.points as f64 >= (1.0 - STRAYS) * all as f64;
+        if is_guess && is_one_surface {
             return Ok(());
         }
         let is_from_behind = if is_guess { is_below(turned.normal) } else { told < 0.0 };
@@ -236,12 +240,19 @@ impl View {
 
     /// How much denser what is nearer by a standard deviation is, as a logarithm, or 0 if that may be chance: of the points of a
     /// patch by how near it is, and by the logarithm of its cosine, because a scanner sees fewer points of what is slanted.
-    fn density(&self, grid: &Grid, patches: &Patches) -> f64 {
+    fn density(&self, ball: &Ball, grid: &Grid, patches: &Patches) -> f64 {
+        let mean = patches.all.iter().map(|patch| f64::from(patch.points)).sum::<f64>() / patches.all.len() as f64;
         let samples = || {
-            patches.places(grid).filter(|(patch, _)| !patch.has_rival).filter_map(|(patch, place)| {
+            let near = patches.places(grid).filter(|&(patch, place)| !patch.has_rival && ball.holds(place));
+            near.filter_map(|(patch, place)| {
                 let cosine = self.cosine(patch, false).abs();
                 let nearness = self.towards.as_dvec3().dot(place);
-                (cosine >= FACING).then(|| (1.0, DVec3::new(log2(patch.points.into()), nearness, log2(cosine.into()))))
+                (cosine >= FACING).then(|| {
+                    (
+                        f64::from(patch.points) / mean,
+                        DVec3::new(log2(patch.points.into()), nearness, log2(cosine.into())),
+                    )
+                })
             })
         };
         let Thinning { count, near, error, depth, .. } = Thinning::of(samples);

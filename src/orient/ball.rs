@@ -1,0 +1,48 @@
+//! Where nearly all of a cloud lies: what is far off it may be strays, and tells nothing of the whole.
+
+use crate::grid::Grid;
+use crate::lattice::BRICK;
+use crate::median::ranked_runs;
+use glam::{DVec3, IVec3};
+
+/// The share of the points that may stray: raw scans have echoes of birds, dust and the sun, and what mirrors show, mostly less
+/// than one in fifty.
+pub(super) const STRAYS: f64 = 0.03;
+
+/// What is no more than so many times as far as nearly all points is not far off: even if it strays, it weighs little
+/// more in a fit than the farthest of the rest.
+const FAR_OFF: f64 = 2.0;
+
+/// A ball round the middle of a cloud.
+pub(super) struct Ball {
+    /// In edges, as all of it.
+    middle: DVec3,
+    radius: f64,
+}
+
+impl Ball {
+    /// That of a cloud, by ranks: whatever a few points do, it holds the others and is no larger than twice what they take. Some
+    /// passes over the bricks.
+    pub fn of(grid: &Grid) -> Self {
+        let bricks = || grid.bricks.places.iter().zip(grid.first_point.windows(2));
+        let points = |range: &[u32]| (range[1] - range[0]) as usize;
+        let all = bricks().map(|(_, range)| points(range)).sum::<usize>();
+        let median = |axis: usize| {
+            // No place is negative.
+            ranked_runs(bricks().map(|(place, range)| (place[axis] as u32, points(range))), all / 2) as i32
+        };
+        let middle = IVec3::new(median(0), median(1), median(2));
+        // Square distances are whole numbers, too, but may be large ones.
+        let square = |place: IVec3| (place - middle).as_vec3().length_squared();
+        let squares = bricks().map(|(&place, range)| (square(place).to_bits(), points(range)));
+        let square = f32::from_bits(ranked_runs(squares, ((1.0 - STRAYS) * all as f64) as usize));
+        // And a brick, because where in it points lie is not asked.
+        let radius = FAR_OFF * f64::from(square).sqrt() + 1.0;
+        Self { middle: f64::from(BRICK) * (middle.as_dvec3() + 0.5), radius: f64::from(BRICK) * radius }
+    }
+
+    /// Whether a place is not far off.
+    pub fn holds(&self, place: DVec3) -> bool {
+        place.distance_squared(self.middle) <= self.radius * self.radius
+    }
+}
