@@ -1,6 +1,6 @@
 //! Clouds that were seen from one side: all their surfaces face the scanner.
 
-use super::ball::{Ball, STRAYS};
+use super::ball::Ball;
 use super::components::{Decision, Side, is_below};
 use super::looks::{Looks, Votes};
 use super::patches::{Patch, Patches, signed};
@@ -120,8 +120,8 @@ impl View {
     ///
     /// At which end of the direction that was is told by three things: what was scanned has its volume behind what is seen of
     /// it; what looks at another surface stands before it; and of what is twice as far a scanner with rays in all directions,
-    /// or a camera, sees a quarter as many points. Where nothing tells, one surface stays as it is, and of more the mean of all
-    /// normals is turned by convention.
+    /// or a camera, sees a quarter as many points. Where nothing tells, the mean of all normals is
+    /// turned by convention.
     pub fn turn_to_it(
         &self,
         ball: &Ball,
@@ -136,11 +136,6 @@ impl View {
             + looking(looks, signs, decisions, &turned) / CLEAR_LOOKING
             + (self.density(ball, grid, patches) / CLEAR_DENSITY).clamp(-MOST_BY_DENSITY, MOST_BY_DENSITY);
         let is_guess = told.abs() < GUESS;
-        let all: u64 = decisions.iter().map(|decision| decision.component.points).sum();
-        let is_one_surface = decisions[0].component.points as f64 >= (1.0 - STRAYS) * all as f64;
-        if is_guess && is_one_surface {
-            return Ok(());
-        }
         let is_from_behind = if is_guess { is_below(turned.normal) } else { told < 0.0 };
         let told = match is_guess {
             true => (Side::Convention, 0.0),
