@@ -720,6 +720,36 @@ fn bodies_refined_on_one_side_face_outwards() {
     }
 }
 
+/// Half of a smooth body, as on a turntable, is no room of which a scanner saw half: its densities go with its normals.
+#[test]
+fn a_body_scanned_from_some_sides_faces_outwards() {
+    let size = [2.0, 0.7, 0.6];
+    for (first, reach) in [80.0, 120.0, 160.0].into_iter().flat_map(|first| [2.6, 3.6].map(|reach| (first, reach))) {
+        let mut random = Random(101);
+        let scanners = [first, first + 60.0, first + 120.0].map(|angle: f64| {
+            let (sine, cosine) = angle.to_radians().sin_cos();
+            [reach * cosine, reach * sine, 0.3 * reach]
+        });
+        let samples = std::iter::from_fn(|| {
+            let d = random.direction();
+            let (p, n) = ([0, 1, 2].map(|axis| size[axis] * d[axis]), [0, 1, 2].map(|axis| d[axis] / size[axis]));
+            let length = n.iter().map(|c| c * c).sum::<f64>().sqrt();
+            // What all of them send there, on as much of the body as a direction meets.
+            let seen = scanners.map(|scanner| {
+                let ray = [0, 1, 2].map(|axis| scanner[axis] - p[axis]);
+                let distance = ray.iter().map(|c| c * c).sum::<f64>().sqrt();
+                (0..3).map(|axis| ray[axis] * n[axis]).sum::<f64>().max(0.0) / distance.powi(3)
+            });
+            let is_taken = random.unit() < 0.3 * length * seen.iter().sum::<f64>();
+            Some(is_taken.then(|| (p, n.map(|c| c / length))))
+        });
+        let cloud = Cloud::of(samples.flatten().take(30_000).map(|(p, n)| (turn(p), turn(n))));
+        let result = orient(&cloud.points, Orient::Consistent);
+        let about = components(&result);
+        assert!(share_right(&result.normals, &cloud.normals) > 0.999, "{first}, {reach}: {about:?}");
+    }
+}
+
 /// A floor is seen from one side, and a ball over it from all.
 #[test]
 fn what_was_scanned_all_round_is_no_part_of_a_view() {

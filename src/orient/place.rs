@@ -172,6 +172,47 @@ pub(super) fn explained(spots: &[Spot], place: DVec3) -> f64 {
     1.0 - variance(&|spot| spot.density - Ray::between(spot, place).density()) / variance(&|spot| spot.density)
 }
 
+/// The share of the variance of densities that the normals of surfaces explain, turned to a place: by their harmonics up to the
+/// second order, which are all but all that light from afar makes of them (Basri and Jacobs, "Lambertian reflectance and linear
+/// subspaces", IEEE Transactions on Pattern Analysis and Machine Intelligence 25, 2003, 218-233). So it is with the rays of
+/// scanners that stood round an object.
+pub(super) fn explained_by_normals(spots: &[Spot], place: DVec3) -> f64 {
+    /// Harmonics, and the density.
+    const COUNT: usize = 9;
+    let samples = || {
+        spots.iter().filter_map(|spot| {
+            let cosine = Ray::between(spot, place).cosine;
+            let DVec3 { x, y, z } = spot.normal * 1f64.copysign(cosine);
+            let sample = [x, y, z, x * y, y * z, z * x, x * x, y * y, spot.density];
+            (cosine.abs() >= FACING).then_some((spot.weight, sample))
+        })
+    };
+    let (mut mean, mut all) = ([0.0; COUNT], 0.0);
+    for (weight, sample) in samples() {
+        mean.iter_mut().zip(sample).for_each(|(mean, value)| *mean += weight * value);
+        all += weight;
+    }
+    let mut products = [[0.0; COUNT]; COUNT];
+    for (weight, mut sample) in samples() {
+        sample.iter_mut().zip(mean).for_each(|(value, mean)| *value -= mean / all);
+        for (row, one) in products.iter_mut().zip(sample) {
+            row.iter_mut().zip(sample).for_each(|(product, other)| *product += weight * one * other);
+        }
+    }
+    let variance = products[COUNT - 1][COUNT - 1];
+    // Gauss's elimination of one harmonic after the other leaves the variance that none explains. One that hardly varies, as on
+    // flat ground, explains nothing.
+    let little = 1e-3 * all;
+    for harmonic in 0..COUNT - 1 {
+        let row = products[harmonic];
+        for other in &mut products[harmonic + 1..] {
+            let share = other[harmonic] / (row[harmonic] + little);
+            other.iter_mut().zip(row).for_each(|(product, own)| *product -= share * own);
+        }
+    }
+    1.0 - products[COUNT - 1][COUNT - 1] / variance
+}
+
 /// Where densities grow to, as a unit vector, and the share of their variance that this explains.
 pub(super) fn growth(spots: &[Spot]) -> (DVec3, f64) {
     let (mut place, mut density, mut all) = (DVec3::ZERO, 0.0, 0.0);

@@ -3,7 +3,7 @@
 use super::ball::Ball;
 use super::components::{Decision, Side};
 use super::patches::{Patch, Patches, signed};
-use super::place::{FACING, Place, explained, growth, thinning};
+use super::place::{FACING, Place, explained, explained_by_normals, growth, thinning};
 use super::signs::Signs;
 use super::spots::{Spot, bricks_in, cubes_of, some_bricks, spots};
 use super::thinning::Thinning;
@@ -204,14 +204,14 @@ fn middle(ball: &Ball, grid: &Grid) -> DVec3 {
     sum / all
 }
 
-/// Whether densities go with the inverse square of the distance from a place and with the cosine, and how certain that is, up
-/// to 1.
+/// Whether densities go with the inverse square of the distance from a place and with the cosine, and not rather with the normals
+/// alone, as those of an object do that was seen from round it; and how certain that is, up to 1.
 fn law(spots: &[Spot], place: DVec3) -> Option<f64> {
     let Thinning { near, slant, depth, explained, .. } = thinning(spots, place, FACING);
     let certainty = explained * slant.min(1.0 / slant);
     // NaN, where nothing tells them, is none.
     let is_scan = (LEAST_NEAR..=MOST_NEAR).contains(&near) && depth >= LEAST_DEPTH && certainty >= LEAST_CERTAINTY;
-    is_scan.then_some(certainty)
+    (is_scan && explained > explained_by_normals(spots, place)).then_some(certainty)
 }
 
 /// A patch that is looked at.
