@@ -16,8 +16,9 @@ use glam::DVec3;
 /// What errors call the memory of all this.
 const WHAT: &str = "the station";
 
-/// Fewer spots tell no law.
-const LEAST_SPOTS: usize = 64;
+/// Fewer spots tell no law: a place, a level and two powers are fitted to them, and eight harmonics. A room has so many with some
+/// 4000 points.
+const LEAST_SPOTS: usize = 32;
 
 /// Densities that neither nearness to the middle nor a direction explains by this share, are no scan's.
 const LEAST_EXPLAINED: f64 = 0.1;
