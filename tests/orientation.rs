@@ -135,26 +135,29 @@ fn closed_surfaces_face_outwards_whatever_the_method() {
     }
 }
 
+/// A star with blades.
+fn star(tips: usize, inner: f64) -> Vec<[f64; 2]> {
+    let corner = |i: usize| {
+        let (sin, cos) = (i as f64 * TAU / (2 * tips) as f64).sin_cos();
+        let radius = if i.is_multiple_of(2) { 1.0 } else { inner };
+        [radius * cos, radius * sin]
+    };
+    (0..2 * tips).map(corner).collect()
+}
+
+/// Two plates that meet in a T, so thick.
+fn tee(t: f64) -> [[f64; 2]; 8] {
+    [[-1.0, 0.0], [1.0, 0.0], [1.0, t], [t / 2.0, t], [t / 2.0, 1.0], [-t / 2.0, 1.0], [-t / 2.0, t], [-1.0, t]]
+}
+
 /// Walls of two to three spacings, which are less than a cube, and blades whose sides meet at 36 and 28 degrees: points close to
 /// an edge may have the normal of the face beyond.
 #[test]
 fn thin_walls_and_blades_face_outwards() {
-    let star = |tips: usize, inner: f64| -> Vec<[f64; 2]> {
-        (0..2 * tips)
-            .map(|i| {
-                let (sin, cos) = (i as f64 * TAU / (2 * tips) as f64).sin_cos();
-                let radius = if i % 2 == 0 { 1.0 } else { inner };
-                [radius * cos, radius * sin]
-            })
-            .collect()
-    };
-    let t = 0.05;
-    let tee =
-        [[-1.0, 0.0], [1.0, 0.0], [1.0, t], [t / 2.0, t], [t / 2.0, 1.0], [-t / 2.0, 1.0], [-t / 2.0, t], [-1.0, t]];
     let u = 0.06;
     let channel = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [2.0 - u, 1.0], [2.0 - u, u], [u, u], [u, 1.0], [0.0, 1.0]];
     for (name, polygon, height, least) in [
-        ("tee", tee.to_vec(), 2.0, 0.995),
+        ("tee", tee(0.05).to_vec(), 2.0, 0.995),
         ("channel", channel.to_vec(), 2.0, 0.995),
         ("star of 5", star(5, 0.38), 0.4, 0.99),
         ("star of 12", star(12, 0.5), 0.4, 0.98),
@@ -165,6 +168,22 @@ fn thin_walls_and_blades_face_outwards() {
             let right = share_right(&result.normals, &cloud.normals);
             assert!(right >= least, "{name}, noise {noise}: {right}");
         }
+    }
+}
+
+/// Points of rims three spacings wide and at the tips of faces, where no six points next to them are of their face: without
+/// noise planes through more of them tell it.
+#[test]
+fn tips_and_rims_without_noise_face_outwards() {
+    let wrong = |polygon: &[[f64; 2]], height: f64, seed: u64| {
+        let cloud = prism(100_000, seed, polygon, height);
+        let normals = orient(&cloud.points, Orient::Consistent).normals;
+        let dot = |(n, t): (&[f32], &[f64; 3])| (0..3).map(|i| f64::from(n[i]) * t[i]).sum::<f64>();
+        normals.chunks_exact(3).zip(&cloud.normals).map(dot).filter(|dot| *dot <= 0.0).count()
+    };
+    for seed in [1, 2] {
+        let (tee, star) = (wrong(&tee(0.03), 2.0, seed), wrong(&star(12, 0.5), 0.4, seed));
+        assert!(tee <= 1 && star <= 8, "{seed}: {tee} of the tee, {star} of the star");
     }
 }
 

@@ -6,11 +6,11 @@
 //! model fitting with applications to image analysis and automated cartography", Communications of the ACM 24 (1981) 381-395,
 //! with the points next to it in place of random ones).
 
-use super::around::Around;
+use super::around::{Around, Near};
 use super::choose::Chosen;
 use super::level::Level;
 use super::matrix::dot_lanes;
-use crate::lanes::load;
+use crate::lanes::{load, transposed};
 use crate::lattice::cube_centre;
 use crate::median;
 use crate::order::sort_few;
@@ -22,8 +22,12 @@ use std::ops::Range;
 /// precision in a cloud of a million points, and far less than any scanner's noise.
 const ON: f32 = 1e-7;
 
-/// Neighbourhoods of more points are left to the surfaces.
+/// And nearly on one ten times as far away: a plane through points of two sheets, or of one that bends, has more of these.
+const NEARLY: f32 = 100.0 * ON;
+
+/// Neighbourhoods of more points are left to the surfaces, but for what these leave in doubt; of still more everything is.
 const ROOM: usize = 64;
+const ROOM_IN_DOUBT: usize = 4096;
 
 /// Planes go through the point that is asked about, one of so many points next to it, and one of so many; at least one more of
 /// the nearer half of these lies on them.
@@ -37,13 +41,28 @@ const ENOUGH: f32 = 5.0;
 /// The two lie in directions that differ by more than this, the square of a sine.
 const APART: f32 = 0.09;
 
-/// So many points lie on a face besides the one that is asked about, and such a share of all near the cube.
+/// So many points lie on a face besides the one that is asked about, and such a share of all near the cube, because rows of a
+/// scanner are no chance.
 const LEAST: f32 = 6.0;
 const SHARE: f32 = 0.2;
 
-/// They lie in a strip no narrower than a sixth of its length: the sum of the principal minors of the second moments about the
-/// point that is asked about, as a share of their trace squared.
+/// So many do in an exact cloud, whatever their share: with six there are some where balls touch, too.
+const LEAST_EXACT: f32 = 7.0;
+
+/// They lie in a strip no narrower than a sixth of its length: the sum of the principal minors of the second moments about their
+/// mean, as a share of their trace squared.
 const WIDE: f32 = 0.03;
+
+/// A normal is doubtful where fewer than so many of the first points next to it are across it to a fiftieth: on one of the two
+/// faces of an edge half of them are.
+const ACROSS: usize = 3;
+const FLAT: f32 = 0.02;
+
+/// What is left in doubt lies on a plane with so many more points than lie nearly on it.
+const CLEAR: f32 = 4.0;
+
+/// It is looked for among so many points, those next to it.
+const FEW: usize = 128;
 
 /// A cloud is exact where one in eight of some points is in a cube whose points lie off their surface by no more than this, in
 /// edges: far less than any noise, and more than what is left of a smooth surface.
@@ -84,103 +103,249 @@ pub(super) fn are_exact(level: &Level, chosen: &[Chosen]) -> bool {
     rank.is_some_and(|rank| noises[rank].0 < EXACT)
 }
 
-/// The normal of the face that a point of a cube, the one with bit `bit` of a brick, lies on, if the points round that tell one.
-#[inline(never)]
-pub(super) fn normal(level: &Level, brick: usize, bit: u32, around: &mut Around, point: Vec3) -> Option<Vec3> {
-    let near = around.near(&level.grid, brick, bit, 1);
-    // What lies between it and the others.
-    let mut offsets = [Vec3::ZERO; ROOM];
-    let mut count = 0;
-    // The nearest first, each with the square of its distance.
-    let mut next = [Vec4::INFINITY; NEXT];
+/// What lies round the point that is asked about.
+pub(super) struct Facets {
+    /// Whether the cloud is exact ([`are_exact`]).
+    exact: bool,
+    /// What lies between it and each of the others in some cubes.
+    offsets: Vec<Vec3>,
+    /// The nearest first, each with the square of its distance.
+    next: [Vec4; NEXT],
+    /// All of them, lane by lane.
+    lanes: Vec<[Vec4; 3]>,
+    /// What lies between it and those about the farthest one of its plane.
+    afar: Vec<Vec3>,
+}
+
+impl Facets {
+    pub fn new(exact: bool) -> Self {
+        Self { exact, offsets: Vec::new(), next: [Vec4::INFINITY; NEXT], lanes: Vec::new(), afar: Vec::new() }
+    }
+
+    /// The normal of the face that a point of a cube, the one with bit `bit` of a brick, lies on, if the points round that tell
+    /// one.
+    #[inline(never)]
+    pub fn normal(&mut self, level: &Level, brick: usize, bit: u32, around: &mut Around, point: Vec3) -> Option<Vec3> {
+        let room = if self.exact { ROOM_IN_DOUBT } else { ROOM };
+        let all = gather(level, bit, around.near(&level.grid, brick, bit, 1), point, room, |_| true, &mut self.offsets);
+        self.sort();
+        if all.is_none_or(|all| all > ROOM) {
+            return None;
+        }
+        let mut lanes = [[0.0; NEXT]; 3];
+        for (i, place) in self.next.iter().enumerate() {
+            (0..3).for_each(|axis| lanes[axis][i] = place[axis]);
+        }
+        let least = self.least(self.offsets.len());
+        let (mut most, mut best, mut tried) = (OTHERS, None, 0.0);
+        for (i, a) in self.next[..FIRSTS].iter().enumerate() {
+            for (j, b) in (i + 1..).zip(&self.next[i + 1..]) {
+                let normal = a.truncate().cross(b.truncate());
+                let square = normal.length_squared();
+                // Nor where there is none.
+                if square > APART * a.w * b.w {
+                    let closer = on(&lanes, 0..NEXT / 2, normal, ON * square);
+                    if closer < if j < NEXT / 2 { 3.0 } else { 2.0 } {
+                        continue;
+                    }
+                    let count = closer + on(&lanes, NEXT / 2..NEXT, normal, ON * square);
+                    if count >= most {
+                        (most, best) = (count + 1.0, Some(normal / square.sqrt()));
+                    }
+                }
+            }
+            if most > ENOUGH.max(tried) {
+                if best.is_some_and(|normal| is_face(&self.offsets, normal, least)) {
+                    return best;
+                }
+                if !self.exact {
+                    break;
+                }
+                // Next to an edge it may go through points of the face beyond; its own has more.
+                tried = most;
+            }
+        }
+        let normal = best?;
+        if most <= ENOUGH && is_face(&self.offsets, normal, least) {
+            return best;
+        }
+        // Where it ends it may have too few points in the 27 cubes.
+        let near = around.near(&level.grid, brick, bit, 2);
+        let all =
+            gather(level, bit, near, point, usize::MAX, |offset| is_nearly_on(offset, normal), &mut self.offsets)?;
+        is_face(&self.offsets, normal, self.least(all)).then_some(normal)
+    }
+
+    /// Whether hardly a point next to the one that was asked about lies where it should, if that has a normal of this direction.
+    pub fn is_doubtful(&self, direction: Vec3) -> bool {
+        let limit = FLAT * FLAT * direction.length_squared();
+        let is_across = |place: &&Vec4| place.truncate().dot(direction).powi(2) <= limit * place.w;
+        self.next[..FIRSTS].iter().filter(is_across).count() < ACROSS
+    }
+
+    /// The same for a point that is left in doubt, as at the tip of a face or on a narrow one: of all planes through it and two
+    /// of those next to it in the 125 cubes.
+    #[optimize(size)]
+    #[inline(never)]
+    pub fn hidden(&mut self, level: &Level, brick: usize, bit: u32, around: &mut Around, point: Vec3) -> Option<Vec3> {
+        let near = around.near(&level.grid, brick, bit, 2);
+        gather(level, bit, near, point, ROOM_IN_DOUBT, |_| true, &mut self.offsets)?;
+        if self.offsets.len() > FEW {
+            let farther = |a: &Vec3, b: &Vec3| a.length_squared().total_cmp(&b.length_squared());
+            self.offsets.select_nth_unstable_by(FEW, farther);
+            self.offsets.truncate(FEW);
+        }
+        self.sort();
+        self.lanes.clear();
+        self.lanes.extend(self.offsets.chunks(4).map(|four| {
+            let place = |lane: usize| four.get(lane).map_or(Vec4::INFINITY, |offset| offset.extend(0.0));
+            let [x, y, z, _] = transposed([0, 1, 2, 3].map(place));
+            [x, y, z]
+        }));
+        let (mut most, mut best) = (CLEAR, None);
+        let next = self.next;
+        for (i, a) in next.iter().enumerate() {
+            for b in &next[i + 1..] {
+                let normal = a.truncate().cross(b.truncate());
+                let square = normal.length_squared();
+                // Nor where there is none.
+                if square > APART * a.w * b.w {
+                    let clear = clear(&self.lanes, normal, square);
+                    let normal = normal / square.sqrt();
+                    if clear >= most
+                        && (is_face(&self.offsets, normal, LEAST_EXACT)
+                            || self.is_face_from_afar(level, brick, bit, around, point, normal))
+                    {
+                        (most, best) = (clear + 1.0, Some(normal));
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    /// Whether those on a plane are a face from where the farthest of them is: where a face ends it has few points.
+    fn is_face_from_afar(
+        &mut self,
+        level: &Level,
+        brick: usize,
+        bit: u32,
+        around: &mut Around,
+        point: Vec3,
+        normal: Vec3,
+    ) -> bool {
+        let on = self.offsets.iter().filter(|offset| offset.dot(normal).powi(2) <= ON);
+        let Some(farthest) = on.max_by(|a, b| a.length_squared().total_cmp(&b.length_squared())) else { return false };
+        let step = (point + *farthest + 0.5).floor();
+        let Some((brick, bit)) = level.find(level.place(brick, bit) + step.as_ivec3()) else { return false };
+        let (near, point) = (around.near(&level.grid, brick, bit, 2), point - step);
+        let keep = |offset| is_nearly_on(offset, normal);
+        gather(level, bit, near, point, ROOM_IN_DOUBT, keep, &mut self.afar).is_some()
+            && is_face(&self.afar, normal, LEAST_EXACT)
+    }
+
+    /// How many points a face has, of so many near the cube.
+    fn least(&self, all: usize) -> f32 {
+        if self.exact { LEAST_EXACT } else { LEAST.max(SHARE * all as f32) }
+    }
+
+    /// Finds those next to the point.
+    fn sort(&mut self) {
+        self.next = [Vec4::INFINITY; NEXT];
+        for offset in &self.offsets {
+            let square = offset.length_squared();
+            let mut i = NEXT;
+            while i > 0 && square < self.next[i - 1].w {
+                i -= 1;
+                if i + 1 < NEXT {
+                    self.next[i + 1] = self.next[i];
+                }
+                self.next[i] = offset.extend(square);
+            }
+        }
+    }
+}
+
+/// What lies between a point and those of the others in some cubes near one that are to be kept, unless these have more points
+/// than there is room for. Answers how many others there are.
+#[inline(always)]
+fn gather(
+    level: &Level,
+    bit: u32,
+    near: &[Near],
+    point: Vec3,
+    room: usize,
+    keep: impl Fn(Vec3) -> bool,
+    offsets: &mut Vec<Vec3>,
+) -> Option<usize> {
+    offsets.clear();
+    let all = near.iter().map(|near| level.points(near.cube as usize).len()).sum::<usize>();
+    if all > room {
+        return None;
+    }
     for (shift, points) in level.points_near(bit, near) {
         for p in points {
             // In this order, so that it is zero for the point itself.
             let offset = p.local + shift - point;
-            let square = offset.length_squared();
-            if square == 0.0 {
-                continue;
-            }
-            *offsets.get_mut(count)? = offset;
-            count += 1;
-            let mut i = NEXT;
-            while i > 0 && square < next[i - 1].w {
-                i -= 1;
-                if i + 1 < NEXT {
-                    next[i + 1] = next[i];
-                }
-                next[i] = offset.extend(square);
+            if offset != Vec3::ZERO && keep(offset) {
+                offsets.push(offset);
             }
         }
     }
-    let mut lanes = [[0.0; NEXT]; 3];
-    for (i, place) in next.iter().enumerate() {
-        (0..3).for_each(|axis| lanes[axis][i] = place[axis]);
-    }
-    let (mut most, mut best) = (OTHERS, None);
-    for (i, a) in next[..FIRSTS].iter().enumerate() {
-        for (j, b) in (i + 1..).zip(&next[i + 1..]) {
-            let normal = a.truncate().cross(b.truncate());
-            let square = normal.length_squared();
-            // Nor where there is none.
-            if square > APART * a.w * b.w {
-                let closer = on(&lanes, 0..NEXT / 2, normal, ON * square);
-                if closer < if j < NEXT / 2 { 3.0 } else { 2.0 } {
-                    continue;
-                }
-                let count = closer + on(&lanes, NEXT / 2..NEXT, normal, ON * square);
-                if count >= most {
-                    (most, best) = (count + 1.0, Some(normal / square.sqrt()));
-                }
-            }
-        }
-        if most > ENOUGH {
-            break;
-        }
-    }
-    let normal = best?;
-    if is_face(&offsets[..count], count, normal) {
-        return best;
-    }
-    // Where it ends it may have too few points in the 27 cubes.
-    let (mut on, mut count) = (0, 0);
-    for (shift, points) in level.points_near(bit, around.near(&level.grid, brick, bit, 2)) {
-        count += points.len();
-        for p in points {
-            let offset = p.local + shift - point;
-            let height = offset.dot(normal);
-            if height * height <= ON
-                && offset != Vec3::ZERO
-                && let Some(free) = offsets.get_mut(on)
-            {
-                *free = offset;
-                on += 1;
-            }
-        }
-    }
-    is_face(&offsets[..on], count, normal).then_some(normal)
+    Some(all - 1)
 }
 
-/// Whether those of so many points that lie on a plane are a face, and neither a narrow strip nor rows: any two rows of a
-/// scanner, or of coordinates that were rounded, lie in a plane.
+/// How many more points lie on a plane than nearly on it; the square of its normal's length is `square`.
+fn clear(offsets: &[[Vec4; 3]], normal: Vec3, square: f32) -> f32 {
+    let normal = normal.to_array().map(Vec4::splat);
+    let (on, nearly) = (Vec4::splat(ON * square), Vec4::splat(NEARLY * square));
+    let mut sum = Vec4::ZERO;
+    for &four in offsets {
+        let height = dot_lanes(four, normal);
+        let height = height * height;
+        let others = Vec4::select(height.cmple(nearly), Vec4::NEG_ONE, Vec4::ZERO);
+        sum += Vec4::select(height.cmple(on), Vec4::ONE, others);
+    }
+    sum.element_sum()
+}
+
+/// Whether a point lies on a plane, or nearly so.
+#[inline(always)]
+fn is_nearly_on(offset: Vec3, normal: Vec3) -> bool {
+    offset.dot(normal).powi(2) <= NEARLY
+}
+
+/// Whether those that lie on a plane are a face, and neither a cut through something else, a narrow strip nor rows: any two rows
+/// of a scanner, or of coordinates that were rounded, lie in a plane.
 #[optimize(size)]
 #[inline(never)]
-fn is_face(offsets: &[Vec3], all: usize, normal: Vec3) -> bool {
-    let (mut points, mut diagonal, mut off, mut next) = (0.0, Vec3::ZERO, Vec3::ZERO, Vec3::INFINITY);
+fn is_face(offsets: &[Vec3], normal: Vec3, least: f32) -> bool {
+    let (mut points, mut nearly) = (0.0, 0.0);
+    let (mut sum, mut diagonal, mut off, mut next) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO, Vec3::INFINITY);
     for &d in offsets {
         let height = d.dot(normal);
         if height * height <= ON {
             points += 1.0;
+            sum += d;
             diagonal += d * d;
             off += d.yzx() * d.zxy();
             next = if d.length_squared() < next.length_squared() { d } else { next };
+        } else if height * height <= NEARLY {
+            nearly += 1.0;
         }
     }
+    if points < least || 2.0 * nearly > points {
+        return false;
+    }
+    // With the point itself, wherever on the face it lies.
+    let mean = sum / (points + 1.0);
+    diagonal -= mean * sum;
+    off -= mean.yzx() * sum.zxy();
     let trace = diagonal.element_sum();
     let minors = diagonal.dot(diagonal.yzx()) - off.length_squared();
     // The next one is in its own row.
     let in_row = offsets.iter().filter(|d| next.cross(**d).length_squared() <= ON * next.length_squared()).count();
-    points >= LEAST.max(SHARE * all as f32) && minors >= WIDE * trace * trace && in_row == 1
+    minors >= WIDE * trace * trace && in_row == 1
 }
 
 /// How many points of a range, their x, y and z, have a product with `normal` of at most `limit`, squared.
@@ -204,7 +369,7 @@ mod tests {
     fn is_face_of(mut place: impl FnMut(usize, &mut dyn FnMut() -> f32) -> Vec3) -> bool {
         let mut uniform = uniform();
         let offsets: Vec<Vec3> = (0..24).map(|i| place(i, &mut uniform)).collect();
-        is_face(&offsets, offsets.len(), Vec3::Z)
+        is_face(&offsets, Vec3::Z, Facets::new(false).least(offsets.len()))
     }
 
     #[test]
@@ -220,5 +385,22 @@ mod tests {
         assert!(!is_face_of(|i, uniform| Vec3::new(uniform(), (i % 2) as f32, 0.0)), "rows");
         let lattice = |i: usize| Vec3::new((i % 5) as f32 - 2.0, (i / 5 + 1) as f32 - 2.0, 0.0);
         assert!(!is_face_of(|i, _| lattice(i)), "a lattice");
+    }
+
+    /// The tip of a blade, whose faces meet at 28 degrees, seen from there.
+    #[test]
+    fn a_face_is_as_wide_as_it_is_wherever_it_is_seen_from() {
+        let tip = |_: usize, uniform: &mut dyn FnMut() -> f32| {
+            let along = (0.5 + 0.5 * uniform()).sqrt();
+            Vec3::new(along, 0.25 * along * uniform(), 0.0)
+        };
+        assert!(is_face_of(tip));
+    }
+
+    /// A plane through a point just beside a face, and two of its points, goes through others next to the line between these.
+    #[test]
+    fn a_plane_that_many_more_points_nearly_lie_on_is_no_face() {
+        let tilted = |height: f32| is_face_of(|i, u| Vec3::new(u(), u(), if i % 3 == 0 { 0.0 } else { height }));
+        assert!(tilted(0.1) && !tilted(0.002));
     }
 }

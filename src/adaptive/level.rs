@@ -231,10 +231,15 @@ impl Level {
 
     /// The cube at a place, if it is occupied.
     pub fn number(&self, place: IVec3) -> Option<usize> {
+        self.find(place).map(|(brick, bit)| self.grid.cube(brick, bit) as usize)
+    }
+
+    /// The brick, and the bit in that, of the cube at a place, if it is occupied.
+    pub fn find(&self, place: IVec3) -> Option<(usize, u32)> {
         let (brick, inside): (IVec3, IVec3) = (place >> 2, place & 3);
         let brick = self.grid.bricks.number(brick)? as usize;
         let bit = (inside.x + 4 * inside.y + 16 * inside.z) as u32;
-        (self.grid.masks[brick] >> bit & 1 == 1).then(|| self.grid.cube(brick, bit) as usize)
+        (self.grid.masks[brick] >> bit & 1 == 1).then_some((brick, bit))
     }
 
     /// Finds the surface of every cube, through the samples in it and the 26 round it; settled ones get none.

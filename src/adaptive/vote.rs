@@ -3,7 +3,7 @@
 use super::around::{Around, Near};
 use super::choose::Chosen;
 use super::faces::Faces;
-use super::facets;
+use super::facets::Facets;
 use super::level::{Level, Role};
 use super::matrix::{dot_lanes, times_lanes};
 use super::sheets::Sheets;
@@ -126,6 +126,7 @@ struct Task<'a> {
     around: Around,
     ballot: Ballot,
     faces: Faces,
+    facets: Facets,
     sheets: Sheets,
     /// A brick, and the least noise of a surface in and two cubes round it.
     cleanest: (usize, f32),
@@ -141,6 +142,7 @@ impl<'a> Task<'a> {
             around: Around::new(),
             ballot: Ballot::default(),
             faces: Faces::default(),
+            facets: Facets::new(vote.exact),
             sheets: Sheets::new(),
             cleanest: (usize::MAX, 0.0),
             resolved: 0,
@@ -252,15 +254,19 @@ impl<'a> Task<'a> {
                 let place = p.local - centre;
                 let mut facet = None;
                 if is_torn {
-                    facet = facets::normal(level, brick, bit, &mut self.around, place);
+                    facet = self.facets.normal(level, brick, bit, &mut self.around, place);
                 }
                 if facet.is_none() && *is_between.get_or_insert_with(|| self.is_between(brick, bit, surface)) {
                     facet = Some(self.sheets.direction(place));
                 }
-                let direction = facet.unwrap_or_else(|| match &smooth {
+                let mut direction = facet.unwrap_or_else(|| match &smooth {
                     Some(smooth) => smooth.direction(place),
                     None => self.ballot.vote(place),
                 });
+                if is_torn && facet.is_none() && self.vote.exact && self.facets.is_doubtful(direction) {
+                    let hidden = self.facets.hidden(level, brick, bit, &mut self.around, place);
+                    direction = hidden.unwrap_or(direction);
+                }
                 // SAFETY: as above.
                 unsafe { self.writer.write(p.point, direction) };
             }
