@@ -10,10 +10,11 @@ use super::around::{Around, Near};
 use super::choose::Chosen;
 use super::level::Level;
 use super::matrix::dot_lanes;
+use super::vote::TORN;
+use crate::grid::Placed;
 use crate::lanes::{load, transposed};
 use crate::lattice::cube_centre;
 use crate::median;
-use crate::order::sort_few;
 use crate::points::spread;
 use glam::{Vec3, Vec3Swizzles, Vec4};
 use std::ops::Range;
@@ -25,7 +26,8 @@ const ON: f32 = 1e-7;
 /// And nearly on one ten times as far away: a plane through points of two sheets, or of one that bends, has more of these.
 const NEARLY: f32 = 100.0 * ON;
 
-/// Neighbourhoods of more points are left to the surfaces, but for what these leave in doubt; of still more everything is.
+/// Neighbourhoods of more points are left to the surfaces, and of what these leave in doubt so many next to it are looked at, in
+/// neighbourhoods that are not larger still.
 const ROOM: usize = 64;
 const ROOM_IN_DOUBT: usize = 4096;
 
@@ -61,10 +63,7 @@ const FLAT: f32 = 0.02;
 /// What is left in doubt lies on a plane with so many more points than lie nearly on it.
 const CLEAR: f32 = 4.0;
 
-/// It is looked for among so many points, those next to it.
-const FEW: usize = 128;
-
-/// A cloud is exact where one in eight of some points is in a cube whose points lie off their surface by no more than this, in
+/// A cloud is exact where one in eight of some points is in a cube whose points lie off their surface by less than this, in
 /// edges: far less than any noise, and more than what is left of a smooth surface.
 const EXACT: f32 = 0.001;
 
@@ -72,7 +71,8 @@ const EXACT: f32 = 0.001;
 const TELLING: usize = 8;
 
 /// Whether points lie exactly on surfaces in a part of the cloud at least: from how far apart they are across the surface of
-/// their cube, one next to the other, so that both sides of a thin wall in one cube are no noise.
+/// their cube, one next to the other, so that both sides of a thin wall in one cube are no noise. Where that surface is none of
+/// these sides a face of one of the points tells, if half of them are in such cubes: where coordinates were rounded a fifth are.
 #[optimize(size)]
 #[inline(never)]
 pub(super) fn are_exact(level: &Level, chosen: &[Chosen]) -> bool {
@@ -80,7 +80,9 @@ pub(super) fn are_exact(level: &Level, chosen: &[Chosen]) -> bool {
     const BRICKS: usize = 16;
     const POINTS: f32 = 32.0;
     let grid = &level.grid;
-    let (mut gaps, mut noises) = (Vec::new(), Vec::new());
+    let (mut gaps, mut facets) = (Vec::new(), Facets::new(true));
+    // How many points there are, in cubes that are exact, and in those where a point has a face.
+    let (mut all, mut exact, mut on_faces) = (0.0, 0.0, 0.0);
     for brick in spread(grid.bricks.len(), BRICKS) {
         for (cube, (points, bit)) in (grid.first_cube[brick] as usize..).zip(grid.cubes_of(brick)) {
             if points.len() < TELLING || !chosen[cube].is_some() {
@@ -91,16 +93,15 @@ pub(super) fn are_exact(level: &Level, chosen: &[Chosen]) -> bool {
             gaps.extend(points.iter().map(|p| chosen[cube].quadric.at(p.local - centre).1));
             // In edges of a cube that has as many points as those of the base have.
             let count = points.len() as f32;
-            noises.push((median::deviation(&mut gaps) * (count / POINTS).sqrt(), count));
+            all += count;
+            if median::deviation(&mut gaps) * (count / POINTS).sqrt() < EXACT {
+                exact += count;
+            } else if chosen[cube].noise > TORN && facets.has_face(points, centre) {
+                on_faces += count;
+            }
         }
     }
-    sort_few(&mut noises);
-    let mut left = noises.iter().map(|(_, count)| count).sum::<f32>() / 8.0;
-    let rank = noises.iter().position(|(_, count)| {
-        left -= count;
-        left <= 0.0
-    });
-    rank.is_some_and(|rank| noises[rank].0 < EXACT)
+    all > 0.0 && (8.0 * exact >= all || 2.0 * (exact + on_faces) >= all)
 }
 
 /// What lies round the point that is asked about.
@@ -190,10 +191,10 @@ impl Facets {
     pub fn hidden(&mut self, level: &Level, brick: usize, bit: u32, around: &mut Around, point: Vec3) -> Option<Vec3> {
         let near = around.near(&level.grid, brick, bit, 2);
         gather(level, bit, near, point, ROOM_IN_DOUBT, |_| true, &mut self.offsets)?;
-        if self.offsets.len() > FEW {
+        if self.offsets.len() > ROOM {
             let farther = |a: &Vec3, b: &Vec3| a.length_squared().total_cmp(&b.length_squared());
-            self.offsets.select_nth_unstable_by(FEW, farther);
-            self.offsets.truncate(FEW);
+            self.offsets.select_nth_unstable_by(ROOM, farther);
+            self.offsets.truncate(ROOM);
         }
         self.sort();
         self.lanes.clear();
@@ -212,16 +213,35 @@ impl Facets {
                 if square > APART * a.w * b.w {
                     let clear = clear(&self.lanes, normal, square);
                     let normal = normal / square.sqrt();
-                    if clear >= most
-                        && (is_face(&self.offsets, normal, LEAST_EXACT)
-                            || self.is_face_from_afar(level, brick, bit, around, point, normal))
-                    {
-                        (most, best) = (clear + 1.0, Some(normal));
+                    if clear >= most {
+                        most = clear + 1.0;
+                        if is_face(&self.offsets, normal, LEAST_EXACT)
+                            || self.is_face_from_afar(level, brick, bit, around, point, normal)
+                        {
+                            best = Some(normal);
+                        }
                     }
                 }
             }
         }
         best
+    }
+
+    /// Whether the point of a cube next to its centre lies on a face of others of these, through two next to it.
+    fn has_face(&mut self, points: &[Placed], centre: Vec3) -> bool {
+        let square = |p: &&Placed| p.local.distance_squared(centre);
+        let Some(point) = points.iter().min_by(|a, b| square(a).total_cmp(&square(b))) else { return false };
+        let offsets = points.iter().map(|p| p.local - point.local);
+        self.offsets.clear();
+        self.offsets.extend(offsets.filter(|offset| *offset != Vec3::ZERO));
+        self.sort();
+        let next = &self.next[..FIRSTS];
+        let pairs = next.iter().enumerate().flat_map(|(i, a)| next[i + 1..].iter().map(move |b| (a, b)));
+        pairs.into_iter().any(|(a, b)| {
+            let normal = a.truncate().cross(b.truncate());
+            let square = normal.length_squared();
+            square > APART * a.w * b.w && is_face(&self.offsets, normal / square.sqrt(), LEAST_EXACT)
+        })
     }
 
     /// Whether those on a plane are a face from where the farthest of them is: where a face ends it has few points.

@@ -73,7 +73,7 @@ const WIDE: f32 = 0.1;
 const SHEET: usize = 25;
 
 /// Faces are told by points where a surface has more noise than this, in edges and squared: it may lie across an edge,
-const TORN: f32 = 0.0064;
+pub(super) const TORN: f32 = 0.0064;
 
 /// and where the cloud has no noise: near by lies a surface with less.
 const CLEAN: f32 = 1e-5;
