@@ -126,8 +126,9 @@ struct Task<'a> {
     around: Around,
     ballot: Ballot,
     faces: Faces,
-    facets: Facets,
-    sheets: Sheets,
+    /// Only where they are asked for.
+    facets: Option<Facets>,
+    sheets: Option<Sheets>,
     /// A brick, and the least noise of a surface in and two cubes round it.
     cleanest: (usize, f32),
     resolved: u64,
@@ -142,8 +143,8 @@ impl<'a> Task<'a> {
             around: Around::new(),
             ballot: Ballot::default(),
             faces: Faces::default(),
-            facets: Facets::new(vote.exact),
-            sheets: Sheets::new(),
+            facets: (cfg!(feature = "full") && vote.facets).then(|| Facets::new(vote.exact)),
+            sheets: (cfg!(feature = "full") && vote.exact).then(Sheets::new),
             cleanest: (usize::MAX, 0.0),
             resolved: 0,
         }
@@ -151,8 +152,8 @@ impl<'a> Task<'a> {
 
     /// Whether a surface that was fitted to a cube lies between two sheets.
     fn is_between(&mut self, brick: usize, bit: u32, surface: &Surface) -> bool {
-        let Vote { level, .. } = self.vote;
-        self.sheets.find(level, bit, self.around.near(&level.grid, brick, bit, 1), surface)
+        let Self { vote: Vote { level, .. }, around, sheets, .. } = self;
+        sheets.as_mut().is_some_and(|sheets| sheets.find(level, bit, around.near(&level.grid, brick, bit, 1), surface))
     }
 
     /// Whether the surface of a cube may lie across an edge of faces that points tell better.
@@ -253,19 +254,23 @@ impl<'a> Task<'a> {
             for p in placed {
                 let place = p.local - centre;
                 let mut facet = None;
-                if is_torn {
-                    facet = self.facets.normal(level, brick, bit, &mut self.around, place);
+                if is_torn && let Some(facets) = &mut self.facets {
+                    facet = facets.normal(level, brick, bit, &mut self.around, place);
                 }
                 if facet.is_none() && *is_between.get_or_insert_with(|| self.is_between(brick, bit, surface)) {
-                    facet = Some(self.sheets.direction(place));
+                    facet = self.sheets.as_ref().map(|sheets| sheets.direction(place));
                 }
                 let mut direction = facet.unwrap_or_else(|| match &smooth {
                     Some(smooth) => smooth.direction(place),
                     None => self.ballot.vote(place),
                 });
-                if is_torn && facet.is_none() && self.vote.exact && self.facets.is_doubtful(direction) {
-                    let hidden = self.facets.hidden(level, brick, bit, &mut self.around, place);
-                    direction = hidden.unwrap_or(direction);
+                if is_torn
+                    && facet.is_none()
+                    && self.vote.exact
+                    && let Some(facets) = &mut self.facets
+                    && facets.is_doubtful(direction)
+                {
+                    direction = facets.hidden(level, brick, bit, &mut self.around, place).unwrap_or(direction);
                 }
                 // SAFETY: as above.
                 unsafe { self.writer.write(p.point, direction) };
