@@ -34,6 +34,19 @@ const RESOLUTION: f64 = 1.0 / (1 << 24) as f64;
 const LEVELS: u32 = 10;
 /// A number for a probe's edge, and for that halved 1 to [`LEVELS`] times.
 type Levels = [f64; LEVELS as usize + 1];
+/// The same, and a number for what is never parted.
+type Parted = [f64; LEVELS as usize + 2];
+
+/// Strays are told where cubes hold so many points, as on surfaces hardly one is alone then.
+const MANY: f64 = 8.0;
+
+/// They are no surface if more than this share of those that are alone still are so in cubes of twice the edge. Single scans
+/// have up to 0.6 there, most 0.1 to 0.5.
+const STAYING: f64 = 0.6;
+
+/// Besides, so many of all points: a few change nothing. And no more than a quarter are: that is a scene round what is dense.
+const STRAYS: f64 = 0.003;
+const MOST_STRAYS: f64 = 0.25;
 
 /// The paper's L (Eq. 1) for `count` points in a box with sides `extent`: the edge of as many cubes as points.
 ///
@@ -236,26 +249,50 @@ impl Probes {
         let mut found = found.all()?;
         sort(&mut found);
 
-        let mut share = [0.0; LEVELS as usize + 1];
-        let mut chosen = 0.0;
+        // How many points part at each level from the next one in their order, and how many from both beside them; the last number
+        // is for what coincides.
+        let (mut parted, mut left) = (Parted::default(), Parted::default());
         for probe in found.chunk_by(|a, b| a >> (3 * LEVELS) == b >> (3 * LEVELS)) {
-            let weight = f64::from(self.chosen[(probe[0] >> (3 * LEVELS)) as usize].1);
-            chosen += weight;
-            // How many neighbours in their order part at each level.
-            let mut parted = [0; LEVELS as usize + 1];
-            for pair in probe.windows(2) {
-                if let Some(bit) = (pair[0] ^ pair[1]).checked_ilog2() {
-                    parted[(LEVELS - bit / 3) as usize] += 1;
-                }
-            }
-            let mut occupied = 1;
-            for (share, parted) in share.iter_mut().zip(parted) {
-                occupied += parted;
-                *share += weight * f64::from(occupied) / probe.len() as f64;
+            let weight = f64::from(self.chosen[(probe[0] >> (3 * LEVELS)) as usize].1) / probe.len() as f64;
+            let mut before = 0;
+            for (i, point) in probe.iter().enumerate() {
+                // Nothing follows the last one: as if the probe ended there, at level 0.
+                let apart = probe.get(i + 1).map_or(1 << (3 * LEVELS), |next| point ^ next);
+                let after = ((apart.leading_zeros() + 3 * LEVELS - 61) / 3) as usize;
+                parted[after] += weight;
+                left[after.max(before)] += weight;
+                before = after;
             }
         }
-        Ok(share.map(|share| chosen / share))
+        Ok(occupancy(parted, left))
     }
+}
+
+/// Points in an occupied cube at each level, without strays if there are many; of the points that part there from the next one
+/// in their order, and from both beside them.
+///
+/// Of points in a volume one is alone in its cube as often in twice as large ones, until these hold several; on a surface, and
+/// be it as sparse as what is far from a scanner, four times as many points share it then.
+#[optimize(size)]
+fn occupancy(parted: Parted, left: Parted) -> Levels {
+    let points: f64 = parted.iter().sum();
+    let (mut all, mut without) = (Levels::default(), Levels::default());
+    let (mut cubes, mut alone) = (0.0, 0.0);
+    // The levels without strays: if those that are alone in the smallest cubes in which all others have neighbours mostly stay so.
+    let mut cleared = 0;
+    for level in 0..=LEVELS as usize {
+        let before = alone;
+        cubes += parted[level];
+        alone += left[level];
+        all[level] = points / cubes;
+        without[level] = (points - alone) / (cubes - alone);
+        if without[level] >= MANY {
+            let is_strewn = MOST_STRAYS * points > alone && before > STAYING * alone + STRAYS * points;
+            // Neighbours in the smallest of all coincide.
+            cleared = if is_strewn && level < LEVELS as usize { level + 1 } else { 0 };
+        }
+    }
+    std::array::from_fn(|level| if level < cleared { without[level] } else { all[level] })
 }
 
 /// Of the table of probes.
@@ -303,5 +340,33 @@ mod tests {
         assert_eq!(morton(UVec3::new(1, 0, 0)), 1);
         assert_eq!(morton(UVec3::new(0, 3, 0)), 0b010_010);
         assert_eq!(morton(UVec3::splat(1 << LEVELS)), (1 << (3 * LEVELS)) - 1);
+    }
+
+    /// A square of 20,000 points, and as many strays in the cube on it as are asked for.
+    fn strewn_square(strays: usize) -> Points<'static> {
+        // Steps of the plastic number's powers cover all of it evenly, and no rows.
+        let place = |i: usize, height: f64| {
+            let along = |step: f64| (i as f64 * step).fract() as f32;
+            [
+                along(0.819_172_513_396_164_4),
+                along(0.671_043_606_703_789_2),
+                height as f32 * along(0.549_700_477_901_970_3),
+            ]
+        };
+        let points = (0..20_000).map(|i| place(i, 0.0)).chain((0..strays).map(|i| place(i, 1.0)));
+        Points::from_vec(points.flatten().collect()).unwrap()
+    }
+
+    #[test]
+    fn strays_do_not_widen_the_cubes_of_others() {
+        let edge = |strays: usize| {
+            let points = strewn_square(strays);
+            Density::of(&points, &Bounds::of(&points)).unwrap().edge(16.0)
+        };
+        let clean = edge(0);
+        for strays in [20, 200, 600, 2000] {
+            let ratio = edge(strays) / clean;
+            assert!((0.85..1.15).contains(&ratio), "{strays}: {ratio}");
+        }
     }
 }

@@ -1021,6 +1021,20 @@ fn strays_turn_nothing() {
     }
 }
 
+/// As dense as they are, cubes would be so large that both sides of the wall are in one.
+#[test]
+fn strays_all_round_thin_walls_turn_nothing() {
+    for (count, height, share) in [(100_000, 0.03, 0.02), (50_000, 0.04, 0.08), (30_000, 0.05, 0.05)] {
+        let cloud = plate(count, 64, height);
+        let mut random = Random(65);
+        let strays: Vec<f32> =
+            (0..3 * (share * count as f64) as usize).map(|_| (1.4 * random.signed()) as f32).collect();
+        let result = orient(&[&cloud.points[..], &strays].concat(), Orient::Consistent);
+        let right = share_right(&result.normals[..cloud.points.len()], &cloud.normals);
+        assert!(right > 0.999, "{height}, {share} of {count}: {right}");
+    }
+}
+
 /// Of a normal and its oriented one: whether nothing but the sign may have changed.
 fn is_same_line(oriented: &[f32], plain: &[f32]) -> bool {
     assert!(oriented.iter().all(|c| !(*c == 0.0 && c.is_sign_negative())), "{oriented:?}");
