@@ -120,8 +120,7 @@ impl View {
     ///
     /// At which end of the direction that was is told by three things: what was scanned has its volume behind what is seen of
     /// it; what looks at another surface stands before it; and of what is twice as far a scanner with rays in all directions,
-    /// or a camera, sees a quarter as many points. Where nothing tells, the mean of all normals is
-    /// turned by convention.
+    /// or a camera, sees a quarter as many points. Where nothing tells, the mean of all normals is turned by convention.
     pub fn turn_to_it(
         &self,
         ball: &Ball,
