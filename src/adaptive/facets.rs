@@ -10,7 +10,6 @@ use super::around::{Around, Near};
 use super::choose::Chosen;
 use super::level::Level;
 use super::matrix::dot_lanes;
-use super::vote::TORN;
 use crate::grid::Placed;
 use crate::lanes::{load, transposed};
 use crate::lattice::cube_centre;
@@ -18,6 +17,9 @@ use crate::median;
 use crate::points::spread;
 use glam::{Vec3, Vec3Swizzles, Vec4};
 use std::ops::Range;
+
+/// A surface with more noise than this, in edges and squared, may lie across an edge.
+pub(super) const TORN: f32 = 0.0064;
 
 /// A point lies on a plane that is no further away than this, in edges, squared: some thirteen times the rounding of single
 /// precision in a cloud of a million points, and far less than any scanner's noise.

@@ -3,7 +3,7 @@
 use super::around::{Around, Near};
 use super::choose::Chosen;
 use super::faces::Faces;
-use super::facets::Facets;
+use super::facets::{Facets, TORN};
 use super::level::{Level, Role};
 use super::matrix::{dot_lanes, times_lanes};
 use super::sheets::Sheets;
@@ -72,10 +72,8 @@ const WIDE: f32 = 0.1;
 /// Where a sheet goes on, so many cubes within two are occupied; small objects have fewer.
 const SHEET: usize = 25;
 
-/// Faces are told by points where a surface has more noise than this, in edges and squared: it may lie across an edge,
-pub(super) const TORN: f32 = 0.0064;
-
-/// and where the cloud has no noise: near by lies a surface with less.
+/// Where a surface may lie across an edge, points tell faces if the cloud has no noise: near by lies a surface with less than
+/// this, in edges and squared.
 const CLEAN: f32 = 1e-5;
 
 /// In an exact cloud a surface with more noise than this, in edges and squared, may lie between two sheets.

@@ -2,7 +2,6 @@
 
 use super::ball::Ball;
 use super::patches::{Patch, Patches, signed};
-use super::spots::bricks_in;
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
@@ -177,7 +176,7 @@ impl Voxels {
         let (mut first, mut size) = box_round(grid.bricks.places.iter().copied(), 0.0);
         if volume(size) > most {
             // Without what strays; that is not asked, and hides nothing.
-            (first, size) = box_round(bricks_in(ball, grid).map(|brick| grid.bricks.places[brick]), STRAY);
+            (first, size) = box_round(ball.bricks(grid).map(|brick| grid.bricks.places[brick]), STRAY);
         }
         let (cubes, mut doublings) = (size, 0);
         while volume(size) > most {

@@ -45,4 +45,10 @@ impl Ball {
     pub fn holds(&self, place: DVec3) -> bool {
         place.distance_squared(self.middle) <= self.radius * self.radius
     }
+
+    /// The numbers of the bricks that are not far off.
+    pub fn bricks<'a>(&'a self, grid: &'a Grid) -> impl Iterator<Item = usize> + Clone + 'a {
+        let middle = |brick: usize| f64::from(BRICK) * (grid.bricks.places[brick].as_dvec3() + 0.5);
+        (0..grid.bricks.len()).filter(move |&brick| self.holds(middle(brick)))
+    }
 }

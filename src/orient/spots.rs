@@ -37,15 +37,10 @@ pub(super) struct Spot {
     pub weight: f64,
 }
 
-/// The numbers of the bricks that are not far off.
-pub(super) fn bricks_in<'a>(ball: &'a Ball, grid: &'a Grid) -> impl Iterator<Item = usize> + Clone + 'a {
-    (0..grid.bricks.len()).filter(|&brick| ball.holds(f64::from(BRICK) * (grid.bricks.places[brick].as_dvec3() + 0.5)))
-}
-
-/// Some of them, all over the cloud.
+/// The numbers of some bricks that are not far off, all over the cloud.
 pub(super) fn some_bricks<'a>(ball: &'a Ball, grid: &'a Grid) -> impl Iterator<Item = usize> + 'a {
-    let mut some = spread(bricks_in(ball, grid).count(), BRICKS).peekable();
-    let all = bricks_in(ball, grid).enumerate();
+    let mut some = spread(ball.bricks(grid).count(), BRICKS).peekable();
+    let all = ball.bricks(grid).enumerate();
     all.filter_map(move |(i, brick)| some.next_if_eq(&i).map(|_| brick))
 }
 

@@ -5,7 +5,7 @@ use super::components::{Decision, Side};
 use super::patches::{Patch, Patches, signed};
 use super::place::{FACING, Place, explained, explained_by_normals, growth, thinning};
 use super::signs::Signs;
-use super::spots::{Spot, bricks_in, cubes_of, some_bricks, spots};
+use super::spots::{Spot, cubes_of, some_bricks, spots};
 use super::thinning::Thinning;
 use crate::error::Error;
 use crate::grid::Grid;
@@ -196,7 +196,7 @@ impl Candidate {
 /// Near the scanner, if it is a scan: of points at the same angles from each other the mean, where the near ones count more.
 fn middle(ball: &Ball, grid: &Grid) -> DVec3 {
     let (mut sum, mut all) = (DVec3::ZERO, 0.0);
-    for (place, cube, _) in bricks_in(ball, grid).flat_map(|brick| cubes_of(grid, brick)) {
+    for (place, cube, _) in ball.bricks(grid).flat_map(|brick| cubes_of(grid, brick)) {
         let points = grid.points_of(cube).len() as f64;
         let weight = points * points.sqrt();
         sum += weight * place;
