@@ -179,11 +179,12 @@ impl Facets {
         is_face(&self.offsets, normal, self.least(all)).then_some(normal)
     }
 
-    /// Whether hardly a point next to the one that was asked about lies where it should, if that has a normal of this direction.
+    /// Whether hardly a point next to the one that was asked about lies where it should, if that has a normal of this direction:
+    /// only in exact clouds, because elsewhere no plane would tell more.
     pub fn is_doubtful(&self, direction: Vec3) -> bool {
         let limit = FLAT * FLAT * direction.length_squared();
         let is_across = |place: &&Vec4| place.truncate().dot(direction).powi(2) <= limit * place.w;
-        self.next[..FIRSTS].iter().filter(is_across).count() < ACROSS
+        self.exact && self.next[..FIRSTS].iter().filter(is_across).count() < ACROSS
     }
 
     /// The same for a point that is left in doubt, as at the tip of a face or on a narrow one: of all planes through it and two

@@ -264,7 +264,6 @@ impl<'a> Task<'a> {
                 });
                 if is_torn
                     && facet.is_none()
-                    && self.vote.exact
                     && let Some(facets) = &mut self.facets
                     && facets.is_doubtful(direction)
                 {
