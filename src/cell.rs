@@ -249,14 +249,14 @@ impl Probes {
         let mut found = found.all()?;
         sort(&mut found);
 
-        // How many points part at each level from the next one in their order, and how many from both beside them; the last number
-        // is for what coincides.
+        // How many points part at each level from the next one in their order, and how many are left alone there, by both beside
+        // them; the last number is for what coincides.
         let (mut parted, mut left) = (Parted::default(), Parted::default());
         for probe in found.chunk_by(|a, b| a >> (3 * LEVELS) == b >> (3 * LEVELS)) {
             let weight = f64::from(self.chosen[(probe[0] >> (3 * LEVELS)) as usize].1) / probe.len() as f64;
             let mut before = 0;
             for (i, point) in probe.iter().enumerate() {
-                // Nothing follows the last one: as if the probe ended there, at level 0.
+                // By the first three bits that differ, of 64; nothing follows the last one, as if it parted at level 0.
                 let apart = probe.get(i + 1).map_or(1 << (3 * LEVELS), |next| point ^ next);
                 let after = ((apart.leading_zeros() + 3 * LEVELS - 61) / 3) as usize;
                 parted[after] += weight;
@@ -269,7 +269,7 @@ impl Probes {
 }
 
 /// Points in an occupied cube at each level, without strays if there are many; of the points that part there from the next one
-/// in their order, and from both beside them.
+/// in their order, and that are left alone there.
 ///
 /// Of points in a volume one is alone in its cube as often in twice as large ones, until these hold several; on a surface, and
 /// be it as sparse as what is far from a scanner, four times as many points share it then.
