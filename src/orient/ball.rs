@@ -52,3 +52,44 @@ impl Ball {
         (0..grid.bricks.len()).filter(move |&brick| self.holds(middle(brick)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lattice::{CUBES, Lattice};
+    use crate::points::{Bounds, Points};
+    use crate::progress::Progress;
+    use crate::source::Source;
+
+    /// A row of 1000 points over 100 cubes, and these beside it, all in edges; the cubes begin at -8.
+    fn ball_round(strays: &[f32]) -> (Grid, Ball) {
+        let row = (0..1000).map(|i| 0.1 * i as f32);
+        let coordinates: Vec<f32> =
+            [-8.0].into_iter().chain(row).chain(strays.iter().copied()).flat_map(|x| [x, 0.0, 0.0]).collect();
+        let points = Points::from_f32(&coordinates).unwrap();
+        let lattice = Lattice::new(&Bounds::of(&points), &|| DVec3::ZERO, 1.0, CUBES);
+        let stage = Progress::silent();
+        let stage = stage.stage("test", 0.0..1.0);
+        let (grid, _) = Grid::sort(&Source::new(&points, lattice), &stage, |_, _| ()).unwrap();
+        let ball = Ball::of(&grid);
+        (grid, ball)
+    }
+
+    #[test]
+    fn a_few_points_do_not_move_it() {
+        for strays in [&[][..], &[1e4], &[1e6; 25], &[300.0; 25]] {
+            let (grid, ball) = ball_round(strays);
+            let at = |x: f64| DVec3::new(x + 8.0, 0.0, 0.0);
+            assert!([0.0, 50.0, 100.0, -20.0, 120.0].into_iter().all(|x| ball.holds(at(x))), "{strays:?}");
+            assert!([-100.0, 200.0, 1e4].into_iter().all(|x| !ball.holds(at(x))), "{strays:?}");
+            // Of four cubes along an axis: that of the first point, and 25 of the row.
+            assert_eq!(ball.bricks(&grid).count(), 26, "{strays:?}");
+        }
+    }
+
+    #[test]
+    fn what_more_points_share_is_no_stray() {
+        let (grid, ball) = ball_round(&[1e3; 100]);
+        assert_eq!(ball.bricks(&grid).count(), grid.bricks.len());
+    }
+}
