@@ -558,6 +558,52 @@ fn what_is_nearer_to_a_scanner_is_denser() {
     }
 }
 
+/// A tray of 2 x 2, its walls upright, is a lid from below, and holds its volume before it. But who looks into it sees the walls.
+#[test]
+fn a_hollow_faces_who_sees_its_walls() {
+    for (seed, [x, y, z], height) in
+        [(91, [0.1, -0.05, 3.0], 0.2), (92, [-0.2, 0.3, 4.0], 0.3), (93, [0.0, 0.0, 2.5], 0.3)]
+    {
+        for noise in [0.0, 0.003] {
+            let mut random = Random(seed);
+            let ray = || {
+                let [a, b, c] = random.direction();
+                let along = [a, b, -c.abs()];
+                let depths = [1.0f64.copysign(a) - x, 1.0f64.copysign(b) - y, -z];
+                let depths = [0, 1, 2].map(|axis| depths[axis] / along[axis]);
+                let axis = (0..3).min_by(|&one, &other| depths[one].total_cmp(&depths[other])).unwrap();
+                let point = [x + depths[axis] * a, y + depths[axis] * b, z + depths[axis] * along[2]];
+                let normal = [0, 1, 2].map(|other| if other == axis { -along[axis].signum() } else { 0.0 });
+                (point[2] < height).then(|| (turn(point), turn(normal)))
+            };
+            let cloud = Cloud::of(std::iter::repeat_with(ray).flatten().take(60_000)).noisy(noise, 4);
+            let result = orient(&cloud.points, Orient::Consistent);
+            let right = share_right(&result.normals, &cloud.normals);
+            assert!(right > 0.999, "{height}, {noise}: {right}, {:?}", components(&result));
+        }
+    }
+}
+
+/// As dense all over, the same is a lid that was scanned all round.
+#[test]
+fn a_lid_faces_outwards() {
+    for height in [0.3, 0.5, 1.0] {
+        let mut random = Random(94);
+        let cloud = Cloud::of((0..60_000).map(|_| {
+            let (u, v, w) = (random.signed(), random.signed(), random.unit());
+            let (point, normal) = match random.unit() * (1.0 + 2.0 * height) {
+                share if share < 1.0 => ([u, v, height], [0.0, 0.0, 1.0]),
+                share if share < 1.0 + height => ([u.signum(), v, height * w], [u.signum(), 0.0, 0.0]),
+                _ => ([u, v.signum(), height * w], [0.0, v.signum(), 0.0]),
+            };
+            (turn(point), turn(normal))
+        }));
+        let result = orient(&cloud.points, Orient::Consistent);
+        let right = share_right(&result.normals, &cloud.normals);
+        assert!(right > 0.999, "{height}: {right}, {:?}", components(&result));
+    }
+}
+
 /// A closed room of 4 x 3 x 2.4 with a ball and a box in it: the first place on a ray from inside, and the normal there.
 fn first_in_a_room(from: [f64; 3], along: [f64; 3]) -> ([f64; 3], [f64; 3]) {
     let mut first = (f64::INFINITY, [0.0; 3]);

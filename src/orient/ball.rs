@@ -16,7 +16,7 @@ const FAR_OFF: f64 = 2.0;
 /// A ball round the middle of a cloud.
 pub(super) struct Ball {
     /// In edges, as all of it.
-    middle: DVec3,
+    pub middle: DVec3,
     radius: f64,
 }
 
@@ -39,6 +39,11 @@ impl Ball {
         // And a brick, because where in it points lie is not asked.
         let radius = FAR_OFF * f64::from(square).sqrt() + 1.0;
         Self { middle: f64::from(BRICK) * (middle.as_dvec3() + 0.5), radius: f64::from(BRICK) * radius }
+    }
+
+    /// How far from the middle nearly all of it lies, in edges.
+    pub fn reach(&self) -> f64 {
+        self.radius / FAR_OFF
     }
 
     /// Whether a place is not far off.

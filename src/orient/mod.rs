@@ -11,6 +11,8 @@ mod air;
 mod ball;
 mod components;
 mod cubes;
+mod ends;
+mod eye;
 mod facing;
 mod groups;
 mod links;
@@ -136,7 +138,7 @@ fn surfaces(
     match scanner {
         Some(Scanner::At(station)) => station.turn_to_it(grid, &patches, &mut signs, &mut decisions)?,
         Some(Scanner::Towards(view)) => {
-            view.turn_to_it(&ball, grid, &patches, looks.as_ref(), &mut signs, &mut decisions)?
+            view.turn_to_it((&ball, grid, &patches), looks.as_ref(), &mut signs, &mut decisions)?
         }
         None if options.orient == Orient::Consistent => {
             let facing = stage.part(0.9..0.95);
@@ -182,7 +184,7 @@ fn consistent(
     }
     let scanner = match Station::of(ball, grid, patches, choice.signs(), choice.is_all_closed())? {
         Some(station) => Some(Scanner::At(station)),
-        None => View::of(grid, patches, noise, choice.signs(), &stage.part(0.5..0.6))?.map(Scanner::Towards),
+        None => View::of((ball, grid, patches), noise, choice.signs(), &stage.part(0.5..0.6))?.map(Scanner::Towards),
     };
     if looks.is_some() && scanner.is_none() {
         choice.be_cautious(looks.as_ref(), sights, &stage.part(0.6..1.0))?;
