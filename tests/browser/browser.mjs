@@ -148,6 +148,11 @@ export async function colorsShown(page, area) {
   return (await colorsIn(page, area)).length;
 }
 
+/** How bright the brightest pixel of such a square is, 0 to 255. */
+export async function brightestShown(page, area) {
+  return Math.max(...(await colorsIn(page, area)).map(({ green }) => green));
+}
+
 /** The share, 0 to 1, of such a square that has the colour of back faces, which is lit. */
 export async function backsShown(page, area) {
   const colors = await colorsIn(page, area);

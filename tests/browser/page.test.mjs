@@ -8,7 +8,18 @@ import { after, afterEach, before, test as nodeTest } from 'node:test';
 import { gunzipSync } from 'node:zlib';
 import { data } from '../node/data.mjs';
 import { parsePly } from '../node/ply.mjs';
-import { ARTEFACTS, backsShown, choose, colorsShown, drop, openBrowser, result, save, spherePly } from './browser.mjs';
+import {
+  ARTEFACTS,
+  backsShown,
+  brightestShown,
+  choose,
+  colorsShown,
+  drop,
+  openBrowser,
+  result,
+  save,
+  spherePly,
+} from './browser.mjs';
 
 let browser;
 let page;
@@ -176,6 +187,23 @@ test('of several files the first scan is taken, and folders are refused', async 
   await page.evaluate(() => (DataTransferItem.prototype.webkitGetAsEntry = () => ({ isDirectory: true })));
   await drop(page, 'scans', Buffer.alloc(0));
   assert.match((await result(page, 'ball.PLY')).error, /^Folders are not taken/);
+});
+
+test('while a file hangs over the window, nothing shines through what asks for it', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'ball.ply', spherePly(5_000));
+  await result(page, 'ball.ply');
+  // They stay in sight while the panel is scrolled.
+  const covered = ['[data-do=save]', '#name'].map((selector) => page.locator(selector));
+  const clips = await Promise.all(covered.map((part) => part.boundingBox()));
+  for (const clip of clips) assert.ok((await brightestShown(page, { clip })) > 160);
+  await page.evaluate(() => {
+    const dataTransfer = new DataTransfer();
+    dataTransfer.items.add(new File([], 'next.ply'));
+    document.body.dispatchEvent(new DragEvent('dragover', { dataTransfer, bubbles: true, cancelable: true }));
+  });
+  await page.getByText('Drop the scan to see it shaded').waitFor();
+  for (const clip of clips) assert.ok((await brightestShown(page, { clip })) < 80);
 });
 
 test('a bad file gives a message that can be read, and the cloud before stays', async () => {
