@@ -189,6 +189,26 @@ test('of several files the first scan is taken, and folders are refused', async 
   assert.match((await result(page, 'ball.PLY')).error, /^Folders are not taken/);
 });
 
+test('a file that is too large for one buffer says so, and one that is no scan says that', async () => {
+  page = await browser.openPage(browser.isolated);
+  for (const [name, begin, message] of [
+    ['city.ply', 'ply\nformat ascii 1.0\n', 'city.ply: the file has 2.25 GiB, and up to 2 can be opened; '],
+    ['city.las', 'LASF', 'Only PLY files can be opened; city.las is not a PLY file. '],
+  ]) {
+    // One without its bytes: nothing may ask for more than the first of them.
+    await page.evaluate(
+      ([name, begin]) => {
+        const file = Object.defineProperty(new File([begin], name), 'size', { value: 2.25 * 2 ** 30 });
+        const input = document.querySelector('#file');
+        Object.defineProperty(input, 'files', { value: [file], configurable: true });
+        input.dispatchEvent(new Event('change'));
+      },
+      [name, begin],
+    );
+    await page.locator('#notice').filter({ hasText: message }).waitFor();
+  }
+});
+
 test('while a file hangs over the window, nothing shines through what asks for it', async () => {
   page = await browser.openPage(browser.isolated);
   await drop(page, 'ball.ply', spherePly(5_000));
@@ -211,8 +231,20 @@ test('a bad file gives a message that can be read, and the cloud before stays', 
   await drop(page, 'photo.ply', Buffer.from('GIF89a, not a scan'));
   const alert = page.getByRole('alert').filter({ hasText: 'photo.ply' });
   await alert.waitFor();
-  assert.match(await alert.textContent(), /^Only PLY files can be opened; photo\.ply is not .*GIF89a/);
+  assert.match(
+    await alert.textContent(),
+    /^Only PLY files can be opened; photo\.ply is not .*GIF89a.*'\. CloudCompare/,
+  );
   assert.ok(await page.locator('#start').isVisible());
+  // What to do is told once: by the page, or with what the file is.
+  for (const [name, bytes, remedy] of [
+    ['flight.las', 'LASF\0\0\0\0', /a LAS or LAZ file\. CloudCompare .* save scans as PLY\.$/],
+    ['ball.ply.gz', '\x1f\x8b\x08', /a gzip file; unpack it first$/],
+  ]) {
+    await drop(page, name, Buffer.from(bytes, 'latin1'));
+    await page.getByRole('alert').filter({ hasText: name }).waitFor();
+    assert.match(await page.locator('#notice').textContent(), remedy);
+  }
 
   await drop(page, 'ball.ply', spherePly(5_000));
   const before = await result(page, 'ball.ply');

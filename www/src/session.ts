@@ -4,6 +4,7 @@ import { estimateNormals, readPointCloud, writePly, type EstimateOptions } from 
 import { scannerOf } from '../../src/js/scanner';
 import { boundsOf, guessUp } from './bounds';
 import { compare } from './compare';
+import { measure } from './format';
 import { METHODS, askedBy, hasSurfaces, orientOf, parseOptions } from './options';
 import { colorsOf } from './ramp';
 import { UNTURNED, type NormalSource, type State, type Store, type Turned } from './state';
@@ -33,6 +34,9 @@ export interface Session {
 
 const SAMPLE_POINTS = 500_000;
 const ONLY_PLY = 'Only PLY files can be opened';
+const REMEDY = 'CloudCompare and MeshLab, among others, save scans as PLY.';
+/** No larger file goes into one buffer of wasm. */
+const FILE_MOST = 2 ** 31 - 1;
 /** The surface of a point without a normal. */
 const NO_SURFACE = 0xffff_ffff;
 
@@ -93,6 +97,8 @@ export function createSession(store: Store, viewer: Viewer): Session {
 
   async function show(file: File, step: Step): Promise<void> {
     const started = performance.now();
+    // Refused there too, as data without memory for it, whatever they are.
+    if (file.size > FILE_MOST) throw new Error((await beginsAsPly(file)) ? tooLarge(file) : 'not a PLY file');
     const cloud = await readPointCloud(file, { signal: step.signal, onProgress: step.begin(`Reading ${file.name}`) });
     step.signal.throwIfAborted();
     if (cloud.count === 0) throw new Error('the file holds no points');
@@ -323,5 +329,13 @@ function download(blob: Blob, name: string): void {
 function messageOf(trouble: string, error: unknown): string {
   // Where a file begins tells nothing.
   const message = (error instanceof Error ? error.message : String(error)).replace(/^byte 0: /, '');
-  return message.startsWith('not a PLY file') ? `${ONLY_PLY}; ${trouble} is ${message}` : `${trouble}: ${message}`;
+  if (!message.startsWith('not a PLY file')) return `${trouble}: ${message}`;
+  const what = message.replace(/; wanted 'ply' as the first line$/, '');
+  // What is packed, and text of another kind, comes with a remedy of its own.
+  const isTold = /^not a PLY file but .*[;,]/.test(what);
+  return `${ONLY_PLY}; ${trouble} is ${what}${isTold ? '' : `. ${REMEDY}`}`;
+}
+
+function tooLarge({ size }: File): string {
+  return `the file has ${measure(size / 2 ** 30)} GiB, and up to 2 can be opened; save it with fewer points, or as binary if it is text`;
 }
