@@ -29,9 +29,13 @@ is kept, existing normals are replaced. IN may be - for standard input.
       --json             print the report as one line of JSON
       --quiet            print no progress, and no report but that of --json
       --help             print this
+      --version          print the version
 
 Exit status: 0 done; 1 an error, told in one line; 2 wrong usage.
 `;
+
+const version = async (): Promise<string> =>
+  JSON.parse(await readFile(new URL('../package.json', import.meta.url), 'utf8')).version;
 
 class UsageError extends Error {}
 
@@ -46,7 +50,8 @@ interface Task {
   quiet: boolean;
 }
 
-function parse(args: string[]): Task | undefined {
+/** The task, or the text that was asked for. */
+async function parse(args: string[]): Promise<Task | string> {
   let parsed;
   try {
     parsed = parseArgs({
@@ -66,6 +71,7 @@ function parse(args: string[]): Task | undefined {
         json: { type: 'boolean' },
         quiet: { type: 'boolean' },
         help: { type: 'boolean', short: 'h' },
+        version: { type: 'boolean' },
       },
     });
   } catch (error) {
@@ -73,7 +79,8 @@ function parse(args: string[]): Task | undefined {
     throw new UsageError((error as Error).message.split(/[.\n] /)[0]);
   }
   const { values, positionals } = parsed;
-  if (values.help) return undefined;
+  if (values.help) return help;
+  if (values.version) return `${await version()}\n`;
   const [input, ...more] = positionals;
   if (input === undefined) throw new UsageError('no input file');
   if (more.length) throw new UsageError(`one input file at a time; ${more.join(' ')} came too`);
@@ -337,8 +344,8 @@ process.stdout.on('error', (error: NodeJS.ErrnoException) => {
 });
 
 try {
-  const task = parse(process.argv.slice(2));
-  if (!task) process.stdout.write(help);
+  const task = await parse(process.argv.slice(2));
+  if (typeof task === 'string') process.stdout.write(task);
   else {
     const report = await run(task);
     if (task.json) process.stdout.write(`${JSON.stringify(report)}\n`);

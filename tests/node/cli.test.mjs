@@ -188,6 +188,12 @@ test('--help prints the usage', () => {
     assert.ok(stdout.includes(option));
 });
 
+test('--version prints that of the package', () => {
+  const { version } = JSON.parse(readFileSync(new URL('../../package.json', import.meta.url), 'utf8'));
+  const { status, stdout, stderr } = run(['--version']);
+  assert.deepEqual({ status, stdout, stderr }, { status: 0, stdout: `${version}\n`, stderr: '' });
+});
+
 test('wrong usage ends with 2, one line and a hint', () => {
   const cases = [
     [[], /no input file/],
