@@ -142,7 +142,7 @@ function parseOrient(value: string): Task['orient'] {
 /** Reads, estimates, writes. Errors name the file they belong to. */
 async function run(task: Task): Promise<Report> {
   const source = await about(task.input, () => openInput(task.input));
-  await about(task.output, () => checkFolder(task.output));
+  await about(task.output, () => checkOutput(task.output));
   let estimator = await usage(() => createEstimator({ threads: task.threads }));
   const show = task.quiet || !process.stderr.isTTY ? undefined : showProgress;
   try {
@@ -217,8 +217,11 @@ async function openInput(path: string): Promise<Source> {
 }
 
 /** Before the work, not after it. */
-async function checkFolder(path: string): Promise<void> {
-  if ((await stat(path).catch(() => undefined))?.isDirectory()) throw Object.assign(new Error(), { code: 'EISDIR' });
+async function checkOutput(path: string): Promise<void> {
+  const existing = await stat(path).catch(() => undefined);
+  if (existing?.isDirectory()) throw Object.assign(new Error(), { code: 'EISDIR' });
+  // To replace it needs no permission but that of the folder.
+  if (existing && (existing.mode & 0o222) === 0) throw new Error('the file is read-only, and stays as it is');
   if (!(await stat(dirname(path))).isDirectory()) throw Object.assign(new Error(), { code: 'ENOTDIR' });
 }
 

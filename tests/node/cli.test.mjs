@@ -158,6 +158,20 @@ test('input and output may be the same file; links and permissions stay', () => 
   assert.equal(propertyOf(written('link.ply'), 'vertex', 'nx').values.length, 20000);
 });
 
+test('an output that is read-only stays as it is, also behind a link', () => {
+  const path = join(folder, 'archive.ply');
+  writeFileSync(path, ply, { mode: 0o444 });
+  if (process.platform !== 'win32') symlinkSync('archive.ply', join(folder, 'latest.ply'));
+  for (const name of process.platform === 'win32' ? ['archive.ply'] : ['archive.ply', 'latest.ply']) {
+    const { status, stderr } = run(['sphere.ply', '-o', name]);
+    assert.deepEqual(
+      { status, stderr },
+      { status: 1, stderr: `bilinormal: ${name}: the file is read-only, and stays as it is\n` },
+    );
+  }
+  assert.ok(readFileSync(path).equals(ply));
+});
+
 test('standard input and devices', { skip: process.platform === 'win32' }, () => {
   assert.equal(run(['-', '-o', 'piped.ply', '--quiet'], { input: ply }).status, 0);
   assert.equal(propertyOf(written('piped.ply'), 'vertex', 'nx').values.length, 20000);
