@@ -1120,6 +1120,22 @@ test('what a depth camera saw stands upright', async () => {
     await result(page, name);
     assert.equal(await upAxis().inputValue(), up, name);
   }
+  // A shallow thing, which is ground unless the scanner stood before it; one amid it, or beside it, tells nothing.
+  const relief = spherePly(5_000);
+  const first = relief.indexOf('end_header\n') + 'end_header\n'.length;
+  for (let at = first + 8; at < relief.length; at += 12) relief.writeFloatLE(0.2 * relief.readFloatLE(at), at);
+  for (const [place, up] of [
+    ['', 'z'],
+    ['comment scanner position: 0.3 0.2 0.1\n', 'z'],
+    ['comment scanner position: 4 0 5\n', 'z'],
+    ['comment scanner position: 0.3 0.2 5\n', 'y'],
+    ['comment scanner position: 0.3 0.2 -5\n', '-y'],
+  ]) {
+    const name = `relief${up}${place.length}.ply`;
+    await drop(page, name, Buffer.from(relief.toString('latin1').replace('element', `${place}element`), 'latin1'));
+    await result(page, name);
+    assert.equal(await upAxis().inputValue(), up, place);
+  }
 });
 
 const AERIAL = join(data, 'scans', 'las_ahn3_cropped.ply.gz');

@@ -63,10 +63,20 @@ export function boundsOf(positions: Float32Array): Bounds | undefined {
 
 /**
  * Which axis points up. Surveys and rooms are z-up and flat along z, often with an origin far away; what a depth camera saw
- * lies before it, along z, and its y points down; single things (meshes, range scans, statues) are mostly y-up.
+ * lies before it, along z, and its y points down, or up where it looks against z; single things (meshes, range scans,
+ * statues) are mostly y-up. The scanner's place is told by some files.
  */
-export function guessUp({ centre, extent: [x, y, z] }: Bounds, origin: readonly number[]): Up {
+export function guessUp(
+  { centre, extent: [x, y, z] }: Bounds,
+  origin: readonly number[],
+  scanner: readonly [number, number, number] | undefined,
+): Up {
   const surveyed = origin.some((value) => value !== 0);
+  if (scanner && !surveyed) {
+    const [aside, above, away] = scanner.map((value, axis) => value - centre[axis]!) as [number, number, number];
+    // From so far that it saw no more than a camera does, and along z: that the cloud is flat then is no sign of ground.
+    if (Math.abs(away) > Math.max(x, y, 2 * Math.hypot(aside, above))) return away > 0 ? 'y' : '-y';
+  }
   if (surveyed || z < 0.6 * Math.min(x, y)) return 'z';
   // Nothing behind or close to the camera, all within a right angle, and its axis passes through it.
   const [right, down, ahead] = centre;

@@ -105,7 +105,8 @@ export function createSession(store: Store, viewer: Viewer): Session {
     const readMilliseconds = performance.now() - started;
     const bounds = boundsOf(cloud.positions);
     if (!bounds) throw new Error('no point of the file has finite coordinates');
-    const up = guessUp(bounds, cloud.origin);
+    const scanner = scannerOf(cloud);
+    const up = guessUp(bounds, cloud.origin, scanner);
     const hasColors = cloud.colors !== undefined;
     const shading = store.state.shading === 'colors' && !hasColors ? 'shaded' : store.state.shading;
     // Gaussian splats bring zeros.
@@ -119,7 +120,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
       hasColors,
       hasNormals: false,
       hasCurvature: false,
-      scanner: scannerOf(cloud),
+      scanner,
       readMilliseconds,
       hadNormals: normals !== undefined,
     };
