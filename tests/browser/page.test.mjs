@@ -217,12 +217,15 @@ test('while a file hangs over the window, nothing shines through what asks for i
   const covered = ['[data-do=save]', '#name'].map((selector) => page.locator(selector));
   const clips = await Promise.all(covered.map((part) => part.boundingBox()));
   for (const clip of clips) assert.ok((await brightestShown(page, { clip })) > 160);
+  await page.keyboard.press('?');
+  await page.getByRole('dialog').waitFor();
   await page.evaluate(() => {
     const dataTransfer = new DataTransfer();
     dataTransfer.items.add(new File([], 'next.ply'));
     document.body.dispatchEvent(new DragEvent('dragover', { dataTransfer, bubbles: true, cancelable: true }));
   });
   await page.getByText('Drop the scan to see it shaded').waitFor();
+  assert.ok(await page.getByRole('dialog').isHidden(), 'the help gives way');
   for (const clip of clips) assert.ok((await brightestShown(page, { clip })) < 80);
 });
 

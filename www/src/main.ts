@@ -147,7 +147,10 @@ function takeDrops(session: Session): void {
   const carriesFiles = (event: DragEvent) => event.dataTransfer?.types.includes('Files') ?? false;
   const target = document.documentElement;
   addEventListener('dragover', (event) => {
-    target.classList.toggle('dropping', carriesFiles(event));
+    const carries = carriesFiles(event);
+    target.classList.toggle('dropping', carries);
+    // It would lie over all that is shown.
+    if (carries) element<HTMLDialogElement>('#help').close();
   });
   addEventListener('dragleave', (event) => {
     if (event.relatedTarget === null) target.classList.remove('dropping');
