@@ -4,8 +4,10 @@
 //! On one sheet, if it bends evenly, what lies between two points is across the mean of their normals. So where there is no
 //! noise points of two sheets are told apart however thin the gap is.
 
-use crate::grid::Placed;
-use glam::Vec3;
+use crate::bricks::set_bits;
+use crate::grid::{Placed, located};
+use crate::lanes::transposed;
+use glam::{Vec3, Vec4};
 
 /// Cubes of more points are left to the limits of patches.
 const ROOM: usize = u64::BITS as usize;
@@ -48,8 +50,26 @@ impl Doubt {
     }
 }
 
+/// Four points, and their normals, all to one side.
+#[derive(Clone, Copy)]
+struct Four {
+    place: [Vec4; 3],
+    upward: [Vec4; 3],
+}
+
+impl Four {
+    const NONE: Self = Self { place: [Vec4::ZERO; 3], upward: [Vec4::ZERO; 3] };
+
+    /// The squares of twice how far each lies off a sheet that goes through it and another point.
+    #[inline(always)]
+    fn off(&self, place: Vec3, upward: Vec3) -> Vec4 {
+        let across = |axis: usize| (self.place[axis] - place[axis]) * (self.upward[axis] + upward[axis]);
+        let off = across(0) + across(1) + across(2);
+        off * off
+    }
+}
+
 /// A bit for each point that is on the second of two sheets; none if these are not two. `normal` is about that of all points.
-#[optimize(size)]
 #[inline(never)]
 pub(super) fn second(points: &[Placed], normals: &[Vec3], normal: Vec3) -> u64 {
     let count = points.len();
@@ -58,20 +78,35 @@ pub(super) fn second(points: &[Placed], normals: &[Vec3], normal: Vec3) -> u64 {
     }
     let mut upward = [Vec3::ZERO; ROOM];
     upward.iter_mut().zip(normals).for_each(|(upward, &own)| *upward = own * normal.dot(own).signum());
-    let off = |i: usize, j: usize| (points[i].local - points[j].local).dot(upward[i] + upward[j]).powi(2);
+    let mut fours = [Four::NONE; ROOM / 4];
+    for ((four, points), upward) in fours.iter_mut().zip(points.chunks(4)).zip(upward.chunks(4)) {
+        let [x, y, z, _] = transposed(std::array::from_fn(|lane| upward[lane].extend(0.0)));
+        *four = Four { place: located(points, Vec3::ZERO).0, upward: [x, y, z] };
+    }
+    let fours = &fours[..count.div_ceil(4)];
+    // For each point the sum of how far it lies off some of them.
+    let off = |others: u64| -> [f32; ROOM] {
+        let mut sums = [Vec4::ZERO; ROOM / 4];
+        for other in set_bits(others) {
+            let (place, upward) = (points[other as usize].local, upward[other as usize]);
+            sums.iter_mut().zip(fours).for_each(|(sum, four)| *sum += four.off(place, upward));
+        }
+        bytemuck::cast(sums)
+    };
     // The point farthest from the middle, because all sheets go on from where they touch, and the one farthest off its sheet.
     let middle = points.iter().map(|point| point.local).sum::<Vec3>() / count as f32;
     let farthest = |distance: &dyn Fn(usize) -> f32| {
         (0..count).max_by(|&i, &j| distance(i).total_cmp(&distance(j))).unwrap_or_default()
     };
     let a = farthest(&|i| points[i].local.distance_squared(middle));
-    let b = farthest(&|i| off(i, a));
-    if off(b, a) < APART {
+    let off_a = off(1 << a);
+    let b = farthest(&|i| off_a[i]);
+    if off_a[b] < APART {
         return 0;
     }
+    let off_b = off(1 << b);
     let (mut second, mut within, mut between) = (0, 0.0, 0.0);
-    for i in 0..count {
-        let (one, other) = (off(i, a), off(i, b));
+    for (i, (one, other)) in off_a.into_iter().zip(off_b).take(count).enumerate() {
         second |= u64::from(other < one) << i;
         within += one.min(other);
         between += one.max(other);
@@ -80,21 +115,19 @@ pub(super) fn second(points: &[Placed], normals: &[Vec3], normal: Vec3) -> u64 {
         return 0;
     }
     for _ in 0..ROUNDS {
-        let counts = [count as u32 - second.count_ones(), second.count_ones()];
+        let sheets = [u64::MAX >> (ROOM - count) & !second, second];
+        let counts = sheets.map(u64::count_ones);
         if counts[0].min(counts[1]) < LEAST {
             return 0;
         }
-        let side = |i: usize| (second >> i & 1) as usize;
-        // How far a point lies off the others of a sheet.
-        let mean = |i: usize, sheet: usize| {
-            let others = counts[sheet] - u32::from(side(i) == sheet);
-            (0..count).filter(|&j| side(j) == sheet).map(|j| off(i, j)).sum::<f32>() / others as f32
-        };
+        let sums = sheets.map(off);
         let (mut within, mut between) = (0.0, 0.0);
         let next = (0..count).fold(0, |next, i| {
-            let means = [mean(i, 0), mean(i, 1)];
-            within += means[side(i)];
-            between += means[1 - side(i)];
+            let side = (second >> i & 1) as usize;
+            // How far it lies off the others of each sheet.
+            let means = [0, 1].map(|sheet| sums[sheet][i] / (counts[sheet] - u32::from(side == sheet)) as f32);
+            within += means[side];
+            between += means[1 - side];
             next | u64::from(means[1] < means[0]) << i
         });
         if next == second {
