@@ -202,24 +202,36 @@ fn turn(
     tell: bool,
     stage: &Stage,
 ) -> Result<Option<Vec<u32>>, Error> {
+    const WHAT: &str = "the turned normals";
     let mut of_point = if tell { Some(filled(NONE, normals.len(), "the components")?) } else { None };
-    let (normals, components) = (Scatter::new(normals), of_point.as_deref_mut().map(Scatter::new));
-    stage.run(grid.blocks.len(), &|block| {
+    let mut is_turned = filled(false, normals.len(), WHAT)?;
+    let (turned, components) = (Scatter::new(&mut is_turned), of_point.as_deref_mut().map(Scatter::new));
+    stage.part(0.0..0.7).run(grid.blocks.len(), &|block| {
         for (_, cube, _) in grid.cubes_in(block) {
             let first = patches.of_cube(cube).start;
             for (point, membership) in members.of_cube(grid, cube) {
                 let Some((number, is_opposite)) = membership.patch() else { continue };
                 let patch = first + number;
                 // SAFETY: every point of the input stands in the grid once at the most.
-                if is_opposite != signs.flipped[patch] {
-                    let normal = &mut unsafe { normals.slice(point..point + 1) }[0];
-                    *normal = flip(*normal);
-                }
+                let is_turned = &mut unsafe { turned.slice(point..point + 1) }[0];
+                *is_turned = is_opposite != signs.flipped[patch];
                 if let Some(components) = &components {
                     let component = &mut unsafe { components.slice(point..point + 1) }[0];
                     *component = signs.component[patch];
                 }
             }
+        }
+    })?;
+    // One after the other: turned as the cubes have them, each would be waited for.
+    let count = normals.len();
+    let normals = Scatter::new(normals);
+    stage.part(0.7..1.0).run(count.div_ceil(CHUNK), &|i| {
+        let chunk = parallel::piece(count, CHUNK, i);
+        // SAFETY: each point belongs to one chunk.
+        let normals = unsafe { normals.slice(chunk.clone()) };
+        for (normal, &is_turned) in normals.iter_mut().zip(&is_turned[chunk]) {
+            // No jump: nothing foretells who is. As by `flip`, to the bit.
+            *normal -= 2.0 * f32::from(is_turned) * *normal;
         }
     })?;
     Ok(of_point)
