@@ -4,7 +4,8 @@ use std::f64::consts::{LN_2, SQRT_2};
 
 /// The logarithm to base 2 of a number above zero, right to some 50 bits, exact for powers of two. That of zero and of
 /// numbers that are nearly so is about -1023.
-#[optimize(size)]
+// Small where few are asked for, and fast where a scanner is sought.
+#[cfg_attr(not(feature = "full"), optimize(size))]
 pub(crate) fn log2(value: f64) -> f64 {
     if value.is_infinite() {
         return value;
