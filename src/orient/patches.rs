@@ -2,13 +2,15 @@
 
 use super::sheets::{self, Doubt};
 use crate::error::Error;
-use crate::grid::{Grid, Placed};
+use crate::grid::{Grid, Placed, located};
+use crate::lanes::transposed;
 use crate::lattice::{BRICK, cube_centre};
 use crate::lists::{concatenated, grow, reserve, starts};
 use crate::order::sort_few;
 use crate::parallel::Filling;
 use crate::progress::Stage;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
+use std::array::from_fn;
 use std::mem::MaybeUninit;
 use std::ops::{Neg, Range};
 
@@ -306,15 +308,22 @@ fn whole(points: &[Placed], normals: &[Vec3], centre: Vec3, limits: Limits) -> O
     }
     let (place, normal) = (place / points.len() as f32, normal.try_normalize()?);
     let (mut squares, mut doubt) = (0.0, Doubt::NONE);
-    for (point, &own) in points.iter().zip(normals) {
-        let d = point.local - place;
-        let (along, off) = (normal.dot(own), d.dot(normal));
-        if along * along < limits.cosine_squared || off.abs() >= limits.thickness {
+    for (points, normals) in points.chunks(4).zip(normals.chunks(4)) {
+        let ([x, y, z], _) = located(points, place);
+        let [own_x, own_y, own_z, _] = transposed(from_fn(|lane| normals[lane.min(normals.len() - 1)].extend(0.0)));
+        let along = normal.x * own_x + normal.y * own_y + normal.z * own_z;
+        let off = x * normal.x + y * normal.y + z * normal.z;
+        let is_apart = (along * along).cmplt(Vec4::splat(limits.cosine_squared));
+        if (is_apart | off.abs().cmpge(Vec4::splat(limits.thickness))).any() {
             return None;
         }
-        squares += off * off;
+        let square = (off * off).to_array();
+        square[..points.len()].iter().for_each(|square| squares += square);
         if limits.is_exact {
-            doubt.add(off, signed(along < 0.0, d.dot(own)));
+            let own = x * own_x + y * own_y + z * own_z;
+            let own = Vec4::select(along.cmplt(Vec4::ZERO), -own, own);
+            let heights = off.to_array().into_iter().zip(own.to_array());
+            heights.take(points.len()).for_each(|(off, own)| doubt.add(off, own));
         }
     }
     let count = points.len() as u32;
