@@ -365,7 +365,6 @@ fn alike(normals: &[Vec3], limits: Limits) -> Option<Vec3> {
 }
 
 /// The patch of one of two sheets whose normals are about `normal`.
-#[optimize(size)]
 #[inline(never)]
 fn sheet<'a>(
     points: impl Iterator<Item = (&'a Placed, &'a Vec3)> + Clone,
