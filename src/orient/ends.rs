@@ -38,9 +38,9 @@ const LEAST_DENSITIES: f64 = 100.0;
 const LEAST_DEPTH: f64 = 1.0;
 const CHANCE: f64 = 4.0;
 
-/// Hardly a point is seen at a flatter angle, by the cosine; from the right end a quarter of what would be from the other one.
+/// Hardly a point is seen at a flatter angle, by the cosine; from the right end less than half of what would be from the other one.
 const GRAZED: f32 = 0.05;
-const RIGHT_SHARE: f64 = 0.25;
+const RIGHT_SHARE: f64 = 0.4;
 
 /// How often a better place is looked for at either end, by how many patches at the most.
 const ROUNDS: usize = 20;

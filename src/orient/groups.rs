@@ -99,6 +99,11 @@ impl Groups {
         Ok(flipped)
     }
 
+    /// Signs by what patches say about each other alone.
+    pub fn signs_by_links(&self, stage: &Stage) -> Result<Vec<bool>, Error> {
+        self.descend(Trust::Times(0.0), &[], stage)
+    }
+
     /// Signs for components whose evidence from the air may mislead. It adds up with a group's area, that of links only with
     /// its rim; so here it is divided by the root of the group's size. Looks between its patches are added, if any.
     pub fn cautious_signs(&self, looks: Option<&Looks>, sights: &Sights, stage: &Stage) -> Result<Vec<bool>, Error> {

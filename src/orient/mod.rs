@@ -165,8 +165,8 @@ enum Scanner {
 }
 
 /// Signs that trust no part of the open that may mislead: of what is not closed a share counts, beside what its patches see of
-/// each other; but not where all was seen from one place, because the hollow side of that looks at itself. Also these looks, if
-/// there is anything that is not closed, and the scanner, if there was one.
+/// each other; but not where all was seen from one place, because that is open all over behind, and the hollow side of it looks
+/// at itself. Also these looks, if there is anything that is not closed, and the scanner, if there was one.
 fn consistent(
     groups: Groups,
     ball: &Ball,
@@ -180,16 +180,38 @@ fn consistent(
     let mut looks = None;
     if choice.is_any_open() {
         looks = Some(Looks::from_the_open(grid, patches, sights)?);
-        choice.be_cautious(None, sights, &stage.part(0.3..0.5))?;
+        choice.trust_links(&stage.part(0.3..0.4))?;
     }
     let scanner = match Station::of(ball, grid, patches, choice.signs(), choice.is_all_closed())? {
         Some(station) => Some(Scanner::At(station)),
-        None => View::of((ball, grid, patches), noise, choice.signs(), &stage.part(0.5..0.6))?.map(Scanner::Towards),
+        None => view(&mut choice, (ball, grid, patches), noise, sights, &stage.part(0.4..0.6))?.map(Scanner::Towards),
     };
     if looks.is_some() && scanner.is_none() {
         choice.be_cautious(looks.as_ref(), sights, &stage.part(0.6..1.0))?;
     }
     Ok((choice.into_signs(), looks, scanner))
+}
+
+/// The view that the cloud is, if it is one: by links alone, or where these are not enough by some of the air, too. The signs are
+/// those that fit it better.
+fn view(
+    choice: &mut Choice,
+    (ball, grid, patches): (&Ball, &Grid, &Patches),
+    noise: f32,
+    sights: &Sights,
+    stage: &Stage,
+) -> Result<Option<View>, Error> {
+    let by_links = View::of((ball, grid, patches), noise, choice.signs(), &stage.part(0.0..0.3))?;
+    if !choice.is_any_open() || by_links.as_ref().is_some_and(View::is_sure) {
+        return Ok(by_links);
+    }
+    choice.be_cautious(None, sights, &stage.part(0.3..0.5))?;
+    let by_air = View::of((ball, grid, patches), noise, choice.signs(), &stage.part(0.5..0.8))?;
+    if by_links.as_ref().is_some_and(|view| by_air.as_ref().is_none_or(|other| view.is_better(other))) {
+        choice.trust_links(&stage.part(0.8..1.0))?;
+        return Ok(by_links);
+    }
+    Ok(by_air)
 }
 
 /// Gives every point the sign of its patch, and tells the component of each if asked to.

@@ -75,13 +75,24 @@ impl Choice {
     /// Counts a share, for components that are not closed, nor small, beside the looks of their patches at each other, if any.
     pub fn be_cautious(&mut self, looks: Option<&Looks>, sights: &Sights, stage: &Stage) -> Result<(), Error> {
         let cautious = self.groups.cautious_signs(looks, sights, stage)?;
+        self.turn_the_open(&cautious);
+        Ok(())
+    }
+
+    /// Counts nothing of it, for these.
+    pub fn trust_links(&mut self, stage: &Stage) -> Result<(), Error> {
+        let by_links = self.groups.signs_by_links(stage)?;
+        self.turn_the_open(&by_links);
+        Ok(())
+    }
+
+    fn turn_the_open(&mut self, other: &[bool]) {
         let Signs { flipped, component, .. } = &mut self.signs;
-        for ((flipped, cautious), &component) in flipped.iter_mut().zip(cautious).zip(&*component) {
+        for ((flipped, &other), &component) in flipped.iter_mut().zip(other).zip(&*component) {
             if !self.is_closed[component as usize] {
-                *flipped = cautious;
+                *flipped = other;
             }
         }
-        Ok(())
     }
 
     pub fn signs(&self) -> &Signs {

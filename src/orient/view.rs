@@ -61,6 +61,8 @@ const MOST_CONFIDENCE: f64 = 0.5;
 /// same.
 pub(super) struct View {
     eye: Eye,
+    /// The share that does not fit.
+    unfit: f64,
 }
 
 impl View {
@@ -94,11 +96,21 @@ impl View {
                 (eye, turned) = (near, faced);
             }
         }
-        let view = Self { eye };
+        let view = Self { eye, unfit: turned.unfit() };
         let is_one = turned.missed.share() <= MOST_AWAY
             && turned.mixed <= MOST_MIXED
             && view.hidden(each(ball, grid, patches, signs), patches.all.len(), noise)? <= MOST_HIDDEN;
         Ok(is_one.then_some(view))
+    }
+
+    /// Whether it fits as well as any.
+    pub fn is_sure(&self) -> bool {
+        self.unfit <= ENOUGH
+    }
+
+    /// Whether it fits no worse than another one.
+    pub fn is_better(&self, other: &Self) -> bool {
+        self.unfit <= other.unfit
     }
 
     /// Turns all surfaces to the scanner, at that end of the view where it was. Where nothing tells that, the mean of all normals
