@@ -9,6 +9,7 @@ use super::patches::{Patches, signed};
 use super::signs::{LEAST_PATCHES, Signs};
 use crate::error::Error;
 use crate::grid::Grid;
+use crate::lattice::mixed;
 use crate::lists::{filled, reserve};
 use crate::progress::Stage;
 use glam::DVec3;
@@ -67,7 +68,7 @@ pub(super) struct View {
 
 impl View {
     /// That of a cloud, if it is one. Two passes over some patches for each round, of which there is one where the cloud is
-    /// closed, and a sort of all.
+    /// closed, and two over all.
     pub fn of(
         (ball, grid, patches): (&Ball, &Grid, &Patches),
         noise: f32,
@@ -166,23 +167,15 @@ impl View {
                 points,
             }
         }));
-        let order = |one: &Spot, other: &Spot| {
-            one.square
-                .cmp(&other.square)
-                .then(other.depth.total_cmp(&one.depth))
-                .then(other.slope.total_cmp(&one.slope))
-        };
-        spots.sort_unstable_by(order);
+        let (squares, fronts) = squares(&spots)?;
         let (mut hidden, mut all) = (0.0, 0.0);
-        for spots in spots.chunk_by(|one, next| one.square == next.square) {
-            let front = &spots[0];
-            for spot in spots {
-                let steeper = SQRT_2 * front.slope.max(spot.slope);
-                let least = BEHIND + DEVIATIONS * noise + steeper;
-                all += f64::from(spot.points);
-                if front.depth - spot.depth > least {
-                    hidden += f64::from(spot.points);
-                }
+        for (spot, square) in spots.iter().zip(squares) {
+            let front = &spots[fronts[square] as usize];
+            let steeper = SQRT_2 * front.slope.max(spot.slope);
+            let least = BEHIND + DEVIATIONS * noise + steeper;
+            all += f64::from(spot.points);
+            if front.depth - spot.depth > least {
+                hidden += f64::from(spot.points);
             }
         }
         Ok(hidden / all)
@@ -215,4 +208,31 @@ struct Spot {
     /// How much nearer or farther its plane is an edge away.
     slope: f32,
     points: u32,
+}
+
+impl Spot {
+    /// Whether it stands before another one; of two at one depth the steeper does.
+    fn is_before(&self, other: &Self) -> bool {
+        self.depth.total_cmp(&other.depth).then(self.slope.total_cmp(&other.slope)).is_gt()
+    }
+}
+
+/// For each spot the number of its square, in a table by hash, and for each square the spot that stands before all others there.
+fn squares(spots: &[Spot]) -> Result<(Vec<usize>, Vec<u32>), Error> {
+    const FREE: u32 = u32::MAX;
+    let bits = (2 * spots.len()).next_power_of_two().ilog2();
+    let (mut squares, mut fronts) = (Vec::new(), filled(FREE, 1 << bits, WHAT)?);
+    reserve(&mut squares, spots.len(), WHAT)?;
+    for (spot, number) in spots.iter().zip(0..) {
+        let (across, up) = spot.square;
+        let mut square = (mixed(across as u64, up as u64, 0) >> (u64::BITS - bits)) as usize;
+        while fronts[square] != FREE && spots[fronts[square] as usize].square != spot.square {
+            square = (square + 1) % fronts.len();
+        }
+        if fronts[square] == FREE || spot.is_before(&spots[fronts[square] as usize]) {
+            fronts[square] = number;
+        }
+        squares.push(square);
+    }
+    Ok((squares, fronts))
 }
