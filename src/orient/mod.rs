@@ -24,6 +24,7 @@ mod sheets;
 mod signs;
 mod spots;
 mod station;
+mod support;
 mod thinning;
 mod view;
 
