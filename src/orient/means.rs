@@ -264,3 +264,21 @@ fn mean(cubes: &[Cube], position: Vec3, soft: f32) -> Vec3 {
     }
     Vec3::from_array(sums.map(Vec4::element_sum)) / total.element_sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A wall that ends at x = 0: none of the normals of its sides faces as its rim does.
+    #[test]
+    fn both_sides_of_a_wall_agree_on_its_rim() {
+        let sides = [0.1, -0.1].map(|z| {
+            let points = (0..100).map(move |i| Vec3::new(-0.05 * (i % 10) as f32, 0.1 * (i / 10) as f32 - 0.45, z));
+            Cube::of(points.map(move |place| (place, Vec3::Z * z.signum())))
+        });
+        let rim = mean(&sides, Vec3::ZERO, 0.4);
+        assert!(rim.normalize().x > 0.99, "{rim}");
+        let outside = mean(&sides[..1], Vec3::new(-0.2, 0.0, 0.2), 0.4);
+        assert!(outside.normalize().z > 0.95, "{outside}");
+    }
+}
