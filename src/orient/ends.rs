@@ -17,9 +17,10 @@ use glam::DVec3;
 /// What errors call the memory of all this.
 const WHAT: &str = "the view";
 
-/// What tells at which end the scanner was, each as large as makes it clear: how far the volume lies behind the surfaces, how
-/// much what stands before others looks at them, for each patch, how much denser what is nearer is, but no more than some of
-/// these, because densities have other reasons, too; and how much less is seen at next to no angle, the same.
+/// What tells at which end the scanner was, each as large as makes it clear: how far the volume lies behind the surfaces; how
+/// much what stands before others looks at them, for each patch; how much denser what is nearer is, but no more than some of
+/// these, because densities have other reasons, too; and how much less is seen at next to no angle, no more than some either,
+/// because a deep hollow looks like a thing that was scanned from all round, and these are more: there the volume has the say.
 const CLEAR_BULGE: f64 = 0.15;
 const CLEAR_LOOKING: f64 = 0.005;
 const CLEAR_DENSITY: f64 = 0.1;
@@ -38,7 +39,8 @@ const LEAST_DENSITIES: f64 = 100.0;
 const LEAST_DEPTH: f64 = 1.0;
 const CHANCE: f64 = 4.0;
 
-/// Hardly a point is seen at a flatter angle, by the cosine; from the right end less than half of what would be from the other one.
+/// Hardly a point is seen at a flatter angle, by the cosine: from the right end no more than this share of what would be so from
+/// the other one.
 const GRAZED: f32 = 0.05;
 const RIGHT_SHARE: f64 = 0.4;
 
@@ -46,7 +48,8 @@ const RIGHT_SHARE: f64 = 0.4;
 const ROUNDS: usize = 20;
 const SOME: usize = 4096;
 
-/// What is steeper than this, by the cosine, has half as many points as what faces the scanner better than that, or fewer.
+/// What is steeper than the first, by the cosine, is no more than half as dense as what faces the scanner better than the second:
+/// as the logarithm to base 2.
 const STEEP: f64 = 0.3;
 const OPEN: f64 = 0.7;
 const HALF: f64 = -1.0;
