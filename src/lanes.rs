@@ -23,6 +23,12 @@ pub(crate) fn transposed([a, b, c, d]: [Vec4; 4]) -> [Vec4; 4] {
     [x_axis, y_axis, z_axis, w_axis]
 }
 
+/// What is above zero, and zero for the rest: in WebAssembly maxima take several times as long.
+#[inline(always)]
+pub(crate) fn positive(lanes: Vec4) -> Vec4 {
+    Vec4::select(lanes.cmpgt(Vec4::ZERO), lanes, Vec4::ZERO)
+}
+
 /// The square root of each lane.
 #[inline(always)]
 pub(crate) fn root(lanes: Vec4) -> Vec4 {

@@ -18,7 +18,7 @@ use super::signs::Signs;
 use super::support::Support;
 use crate::bricks::set_bits;
 use crate::error::Error;
-use crate::lanes::{root, transposed};
+use crate::lanes::{positive, root, transposed};
 use crate::lists::grow;
 use crate::parallel::Scatter;
 use crate::points::Points;
@@ -239,8 +239,6 @@ impl Cube {
 /// What the normals within an edge say of a position, the nearer the more: the mean of their fields as dipoles, which are as
 /// smooth as if each were `soft` beside the position. The more they contradict each other, the shorter it is.
 fn mean(cubes: &[Cube], position: Vec3, soft: f32) -> Vec3 {
-    // In WebAssembly maxima take several times as long.
-    let positive = |lanes: Vec4| Vec4::select(lanes.cmpgt(Vec4::ZERO), lanes, Vec4::ZERO);
     let dot = |[ax, ay, az]: [Vec4; 3], [bx, by, bz]: [Vec4; 3]| ax * bx + ay * by + az * bz;
     let here = position.extend(0.0);
     let [x, y, z] = position.to_array().map(Vec4::splat);

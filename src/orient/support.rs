@@ -1,6 +1,7 @@
 //! On which of two planes through a place the points about it lie.
 
 use crate::error::Error;
+use crate::lanes::positive;
 use crate::lists::grow;
 use glam::{Vec3, Vec4};
 
@@ -49,8 +50,6 @@ impl Support {
     /// How much lies on the planes through a place across two directions: points up to an edge away, and so far off the plane,
     /// the nearer to both the more. A point at the place itself is worth 1.
     pub fn of_planes(&self, place: Vec3, directions: [Vec3; 2], thickness: f32) -> [f32; 2] {
-        // In WebAssembly maxima take several times as long.
-        let positive = |lanes: Vec4| Vec4::select(lanes.cmpgt(Vec4::ZERO), lanes, Vec4::ZERO);
         let scale = 1.0 / (thickness * thickness);
         let [x, y, z] = place.to_array().map(Vec4::splat);
         let directions = directions.map(|direction| direction.to_array().map(Vec4::splat));
