@@ -225,9 +225,8 @@ fn turn(
     tell: bool,
     stage: &Stage,
 ) -> Result<Option<Vec<u32>>, Error> {
-    const WHAT: &str = "the turned normals";
     let mut of_point = if tell { Some(filled(NONE, normals.len(), "the components")?) } else { None };
-    let mut is_turned = filled(false, normals.len(), WHAT)?;
+    let mut is_turned = filled(false, normals.len(), "the turned normals")?;
     let (turned, components) = (Scatter::new(&mut is_turned), of_point.as_deref_mut().map(Scatter::new));
     stage.part(0.0..0.7).run(grid.blocks.len(), &|block| {
         for (_, cube, _) in grid.cubes_in(block) {
