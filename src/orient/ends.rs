@@ -2,7 +2,7 @@
 
 use super::ball::Ball;
 use super::components::Decision;
-use super::eye::{Eye, Missed, Signed, Turned, each};
+use super::eye::{Eye, Missed, Turned, some};
 use super::looks::{Looks, Votes};
 use super::patches::{Patches, signed};
 use super::signs::Signs;
@@ -10,7 +10,6 @@ use super::spots::{Spot, spots};
 use super::thinning::Thinning;
 use crate::error::Error;
 use crate::grid::Grid;
-use crate::lists::reserve;
 use crate::power::log2;
 use glam::DVec3;
 
@@ -141,21 +140,18 @@ fn grazed(
     (ball, grid, patches): (&Ball, &Grid, &Patches),
     signs: &Signs,
 ) -> Result<f64, Error> {
-    let stride = patches.all.len().div_ceil(SOME);
-    let mut some = Vec::new();
-    reserve(&mut some, patches.all.len().div_ceil(stride), WHAT)?;
-    let is_seen = |patch: &Signed| turned.components[patch.component as usize].is_some();
-    some.extend(each(ball, grid, patches, signs).step_by(stride).filter(is_seen));
+    let mut some = some(SOME, (ball, grid, patches), signs)?;
+    some.retain(|patch| turned.components[patch.component as usize].is_some());
+    some.iter_mut().for_each(|patch| *patch = patch.turned(turned.is_flipped(patch.component as usize)));
     let least = |range: [f64; 2]| {
-        let (mut least, mut next) = (f64::INFINITY, eye.taught(&Missed::default(), range));
+        let (mut least, mut next) = (f64::INFINITY, Some(eye.within(range)));
         for _ in 0..ROUNDS {
             let Some(eye) = next else { break };
             let mut missed = Missed::default();
             for patch in &some {
-                let normal = signed(turned.is_flipped(patch.component as usize), patch.normal);
                 missed.all += f64::from(patch.points);
-                if eye.cosine(normal, patch.place) < GRAZED {
-                    missed.add(patch, normal);
+                if eye.cosine(patch.normal, patch.place) < GRAZED {
+                    missed.add(patch);
                 }
             }
             least = least.min(missed.share());

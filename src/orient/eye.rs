@@ -54,15 +54,19 @@ impl Eye {
         self.nearness.abs() >= NEAREST
     }
 
+    /// The same as near as may be, from `least` to `most` times the largest nearness.
+    pub fn within(self, [least, most]: [f64; 2]) -> Self {
+        Self { nearness: self.nearness.clamp(NEAREST * least, NEAREST * most), ..self }
+    }
+
     /// The eye that more faces, as a perceptron learns (Rosenblatt, 1958): towards what still faces away. Nearness is one more
-    /// coordinate, from `least` to `most` times the largest.
-    pub fn taught(&self, missed: &Missed, [least, most]: [f64; 2]) -> Option<Self> {
+    /// coordinate, kept within `range`.
+    pub fn taught(&self, missed: &Missed, range: [f64; 2]) -> Option<Self> {
         let share = RATE / missed.all.max(1.0);
         let towards = self.towards + share * missed.normal;
         let length = towards.length();
         let nearness = (self.nearness - share * missed.flux / self.radius) / length;
-        let nearness = nearness.clamp(NEAREST * least, NEAREST * most);
-        (length > 0.0).then(|| Self { towards: towards / length, nearness, ..*self })
+        (length > 0.0).then(|| Self { towards: towards / length, nearness, ..*self }.within(range))
     }
 }
 
@@ -74,6 +78,13 @@ pub(super) struct Signed {
     pub normal: Vec3,
     pub points: u32,
     pub component: u32,
+}
+
+impl Signed {
+    /// The same, or facing the other way.
+    pub fn turned(self, is_flipped: bool) -> Self {
+        Self { normal: signed(is_flipped, self.normal), ..self }
+    }
 }
 
 /// All patches.
@@ -92,6 +103,20 @@ pub(super) fn each<'a>(
     })
 }
 
+/// Some patches, all over the cloud, `most` of them at the most.
+pub(super) fn some(
+    most: usize,
+    (ball, grid, patches): (&Ball, &Grid, &Patches),
+    signs: &Signs,
+) -> Result<Vec<Signed>, Error> {
+    let count = patches.all.len();
+    let stride = count.div_ceil(most).max(1);
+    let mut some = Vec::new();
+    reserve(&mut some, count.div_ceil(stride), WHAT)?;
+    some.extend(each(ball, grid, patches, signs).step_by(stride));
+    Ok(some)
+}
+
 /// Sums over what faces away from an eye.
 #[derive(Default)]
 pub(super) struct Missed {
@@ -105,12 +130,12 @@ pub(super) struct Missed {
 }
 
 impl Missed {
-    /// Adds the points of a patch with this normal.
-    pub fn add(&mut self, patch: &Signed, normal: Vec3) {
-        let points = f64::from(patch.points);
+    /// Adds the points of a patch.
+    pub fn add(&mut self, &Signed { place, normal, points, .. }: &Signed) {
+        let points = f64::from(points);
         self.points += points;
         self.normal += points * normal.as_dvec3();
-        self.flux += points * f64::from(normal.dot(patch.place));
+        self.flux += points * f64::from(normal.dot(place));
     }
 
     /// The share that faces away.
@@ -166,11 +191,11 @@ impl Turned {
             let points = f64::from(patch.points);
             all += points;
             let Some(Seen { is_flipped, .. }) = components[patch.component as usize] else { continue };
-            let normal = signed(is_flipped, patch.normal);
+            let patch = patch.turned(is_flipped);
             missed.all += points;
-            sum += points * normal.as_dvec3();
-            if normal.dot(eye.direction(patch.place)) < 0.0 {
-                missed.add(&patch, normal);
+            sum += points * patch.normal.as_dvec3();
+            if patch.normal.dot(eye.direction(patch.place)) < 0.0 {
+                missed.add(&patch);
             }
         }
         Ok(Self { components, mixed: 1.0 - missed.all / all, missed, normal: sum })
@@ -209,7 +234,7 @@ mod tests {
         for _ in 0..30 {
             missed = Missed { all: 8.0 * tray.len() as f64, ..Missed::default() };
             let away = tray.iter().filter(|patch| eye.cosine(patch.normal, patch.place) < 0.02);
-            away.for_each(|patch| missed.add(patch, patch.normal));
+            away.for_each(|patch| missed.add(patch));
             eye = eye.taught(&missed, range).unwrap();
         }
         (eye, missed.share())

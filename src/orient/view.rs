@@ -3,7 +3,7 @@
 use super::ball::Ball;
 use super::components::{Decision, Side, is_below};
 use super::ends::told;
-use super::eye::{Eye, Seen, Signed, Turned, each};
+use super::eye::{Eye, Seen, Signed, Turned, each, some};
 use super::looks::Looks;
 use super::patches::{Patches, signed};
 use super::signs::{LEAST_PATCHES, Signs};
@@ -78,10 +78,7 @@ impl View {
         if patches.all.len() < LEAST_PATCHES as usize {
             return Ok(None);
         }
-        let stride = patches.all.len().div_ceil(SOME);
-        let mut some = Vec::new();
-        reserve(&mut some, patches.all.len().div_ceil(stride), WHAT)?;
-        some.extend(each(ball, grid, patches, signs).step_by(stride));
+        let some = some(SOME, (ball, grid, patches), signs)?;
         let mut sums = filled(DVec3::ZERO, signs.components, WHAT)?;
         for patch in &some {
             sums[patch.component as usize] += f64::from(patch.points) * patch.normal.as_dvec3();
