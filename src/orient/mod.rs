@@ -206,10 +206,10 @@ fn view(
     if !choice.is_any_open() || by_links.as_ref().is_some_and(View::is_sure) {
         return Ok(by_links);
     }
-    choice.be_cautious(None, sights, &stage.part(0.3..0.5))?;
-    let by_air = View::of((ball, grid, patches), noise, choice.signs(), &stage.part(0.5..0.8))?;
+    let signs_by_links = choice.be_cautious(None, sights, &stage.part(0.3..0.5))?;
+    let by_air = View::of((ball, grid, patches), noise, choice.signs(), &stage.part(0.5..1.0))?;
     if by_links.as_ref().is_some_and(|view| by_air.as_ref().is_none_or(|other| view.is_better(other))) {
-        choice.trust_links(&stage.part(0.8..1.0))?;
+        choice.exchange(signs_by_links);
         return Ok(by_links);
     }
     Ok(by_air)

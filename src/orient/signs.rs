@@ -73,26 +73,28 @@ impl Choice {
     }
 
     /// Counts a share, for components that are not closed, nor small, beside the looks of their patches at each other, if any.
-    pub fn be_cautious(&mut self, looks: Option<&Looks>, sights: &Sights, stage: &Stage) -> Result<(), Error> {
+    /// Answers the signs that there were.
+    pub fn be_cautious(&mut self, looks: Option<&Looks>, sights: &Sights, stage: &Stage) -> Result<Vec<bool>, Error> {
         let cautious = self.groups.cautious_signs(looks, sights, stage)?;
-        self.turn_the_open(&cautious);
-        Ok(())
+        Ok(self.exchange(cautious))
     }
 
     /// Counts nothing of it, for these.
     pub fn trust_links(&mut self, stage: &Stage) -> Result<(), Error> {
         let by_links = self.groups.signs_by_links(stage)?;
-        self.turn_the_open(&by_links);
+        self.exchange(by_links);
         Ok(())
     }
 
-    fn turn_the_open(&mut self, other: &[bool]) {
+    /// Takes other signs for components that are not closed, nor small. Answers those that there were.
+    pub fn exchange(&mut self, mut other: Vec<bool>) -> Vec<bool> {
         let Signs { flipped, component, .. } = &mut self.signs;
-        for ((flipped, &other), &component) in flipped.iter_mut().zip(other).zip(&*component) {
+        for ((flipped, other), &component) in flipped.iter_mut().zip(&mut other).zip(&*component) {
             if !self.is_closed[component as usize] {
-                *flipped = other;
+                std::mem::swap(flipped, other);
             }
         }
+        other
     }
 
     pub fn signs(&self) -> &Signs {
