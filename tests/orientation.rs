@@ -562,7 +562,7 @@ fn what_is_nearer_to_a_scanner_is_denser() {
 #[test]
 fn a_hollow_faces_who_sees_its_walls() {
     for (seed, [x, y, z], height) in
-        [(91, [0.1, -0.05, 3.0], 0.2), (92, [-0.2, 0.3, 4.0], 0.3), (93, [0.0, 0.0, 2.5], 0.3)]
+        [(91, [0.1, -0.05, 3.0], 0.28), (92, [-0.2, 0.3, 4.0], 0.34), (93, [0.0, 0.0, 2.5], 0.28)]
     {
         for noise in [0.0, 0.003] {
             let mut random = Random(seed);
@@ -584,11 +584,13 @@ fn a_hollow_faces_who_sees_its_walls() {
     }
 }
 
-/// As dense all over, the same is a lid that was scanned all round.
+/// As dense all over, the same is a lid that was scanned all round, also one so low that its walls fill no cube.
 #[test]
 fn a_lid_faces_outwards() {
-    for height in [0.3, 0.5, 1.0] {
-        let mut random = Random(94);
+    let lids =
+        [0.04, 0.05, 0.06, 0.07, 0.1, 0.15].into_iter().flat_map(|height| (94..98).map(move |seed| (height, seed)));
+    for (height, seed) in lids {
+        let mut random = Random(seed);
         let cloud = Cloud::of((0..60_000).map(|_| {
             let (u, v, w) = (random.signed(), random.signed(), random.unit());
             let (point, normal) = match random.unit() * (1.0 + 2.0 * height) {
@@ -600,7 +602,7 @@ fn a_lid_faces_outwards() {
         }));
         let result = orient(&cloud.points, Orient::Consistent);
         let right = share_right(&result.normals, &cloud.normals);
-        assert!(right > 0.999, "{height}: {right}, {:?}", components(&result));
+        assert!(right > 0.999, "{height}, {seed}: {right}, {:?}", components(&result));
     }
 }
 

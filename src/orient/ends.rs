@@ -47,11 +47,11 @@ const RIGHT_SHARE: f64 = 0.4;
 const ROUNDS: usize = 20;
 const SOME: usize = 4096;
 
-/// What is steeper than the first, by the cosine, is no more than half as dense as what faces the scanner better than the second:
-/// as the logarithm to base 2.
+/// What is steeper than the first, by the cosine, has fewer points than what faces the scanner better than the second, by their
+/// ratio and less; if it deviates so much in depth, in edges: what is lower fills no cube, so that nothing tells its density.
 const STEEP: f64 = 0.3;
 const OPEN: f64 = 0.7;
-const HALF: f64 = -1.0;
+const LEAST_HEIGHT: f64 = 1.0;
 
 /// How clearly the scanner was where the eye is, less than zero if at the other end. Four things tell: what was scanned has its
 /// volume behind what is seen of it; what looks at another surface stands before it; of what is twice as far a scanner with rays
@@ -163,15 +163,22 @@ fn grazed(
     if here.min(there) > RIGHT_SHARE * here.max(there) {
         return Ok(0.0);
     }
-    let spots = spots(ball, grid, patches, WHAT)?;
-    let density = |least: f64, most: f64| {
-        let cosine = |spot: &&Spot| spot.normal.dot(eye.towards).abs();
-        let told = spots.iter().filter(|spot| (least..most).contains(&cosine(spot)));
-        let (sum, all) =
-            told.fold((0.0, 0.0), |(sum, all), spot| (sum + spot.weight * spot.density, all + spot.weight));
+    let is_seen_steeply = is_seen_steeply(&spots(ball, grid, patches, WHAT)?, eye);
+    Ok(if is_seen_steeply { there - here } else { 0.0 })
+}
+
+/// Whether what is steep is covered as thinly as a scanner that sees it so covers it.
+fn is_seen_steeply(spots: &[Spot], eye: &Eye) -> bool {
+    let mean = |least: f64, most: f64, of: &dyn Fn(&Spot) -> f64| {
+        let is_told = |spot: &&Spot| (least..most).contains(&spot.normal.dot(eye.towards).abs());
+        let told = spots.iter().filter(is_told);
+        let (sum, all) = told.fold((0.0, 0.0), |(sum, all), spot| (sum + spot.weight * of(spot), all + spot.weight));
         sum / all
     };
+    let depth = |spot: &Spot| eye.towards.dot(spot.place);
+    let middle = mean(0.0, STEEP, &depth);
+    let height = mean(0.0, STEEP, &|spot| (depth(spot) - middle).powi(2)).sqrt();
+    let thinner = mean(0.0, STEEP, &|spot| spot.density) - mean(OPEN, f64::INFINITY, &|spot| spot.density);
     // NaN, where there is nothing steep or nothing else, tells nothing.
-    let is_thinner = density(0.0, STEEP) - density(OPEN, f64::INFINITY) <= HALF;
-    Ok(if is_thinner { there - here } else { 0.0 })
+    height >= LEAST_HEIGHT && thinner <= log2(STEEP / OPEN)
 }
