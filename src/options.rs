@@ -70,8 +70,8 @@ pub enum Orient {
     /// it, to a mean of normals with their signs; and without any noise, where a face is too narrow for a surface, to that of the
     /// plane that the points lie on.
     Consistent,
-    /// The same for surfaces that are closed. Of others every part is turned to what it sees of the open, even if that makes an
-    /// edge of its own, and to nothing that stands before it: for heaps of parts, and objects with holes.
+    /// One sign for each connected surface, away from its inside, also if it is not closed, and to nothing that stands before it,
+    /// nor to a scanner: for objects, also with holes.
     Outward,
     /// Towards a position, in the coordinates of the input: for what was scanned from there.
     Viewpoint([f64; 3]),

@@ -414,8 +414,51 @@ fn edges_outweigh_what_is_seen_from_the_wrong_side() {
         (point[(axis + 1) % 3], point[(axis + 2) % 3], normal[axis]) = (u, v, 1.0);
         (turn(point), turn(normal))
     }));
-    let right = share_right(&orient(&corner.points, Orient::Consistent).normals, &corner.normals);
-    assert_eq!(right.max(1.0 - right), 1.0);
+    for how in [Orient::Consistent, Orient::Outward] {
+        let right = share_right(&orient(&corner.points, how).normals, &corner.normals);
+        assert_eq!(right.max(1.0 - right), 1.0, "{how:?}");
+    }
+}
+
+/// Boxes in the corner of a room, two on the floor and one at a wall, too: of all that the air sees both sides.
+#[test]
+fn a_furnished_corner_has_one_sign() {
+    // From and to; what begins at zero stands there.
+    let boxes = [
+        ([1.2, 0.25, 0.0], [1.8, 0.75, 0.4]),
+        ([0.85, 0.9, 0.0], [1.35, 1.7, 0.5]),
+        ([0.0, 0.4, 0.0], [0.4, 1.0, 1.2]),
+    ];
+    let mut random = Random(25);
+    let mut samples = vec![];
+    let mut add = |axis: usize, place: f64, normal: f64, from: [f64; 3], to: [f64; 3]| {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        for _ in 0..(4000.0 * (to[u] - from[u]) * (to[v] - from[v])) as usize {
+            let mut point = [0, 1, 2].map(|i| from[i] + random.unit() * (to[i] - from[i]));
+            point[axis] = place;
+            let is_covered =
+                |&(from, to): &([f64; 3], [f64; 3])| (0..3).all(|i| from[i] <= point[i] && point[i] <= to[i]);
+            if place > 0.0 || !boxes.iter().any(is_covered) {
+                let mut across = [0.0; 3];
+                across[axis] = normal;
+                samples.push((turn(point), turn(across)));
+            }
+        }
+    };
+    for axis in 0..3 {
+        add(axis, 0.0, 1.0, [0.0; 3], [2.0; 3]);
+        for (from, to) in boxes {
+            add(axis, to[axis], 1.0, from, to);
+            if from[axis] > 0.0 {
+                add(axis, from[axis], -1.0, from, to);
+            }
+        }
+    }
+    let corner = Cloud::of(samples.into_iter());
+    for how in [Orient::Consistent, Orient::Outward] {
+        let right = share_right(&orient(&corner.points, how).normals, &corner.normals);
+        assert!(right.max(1.0 - right) > 0.999, "{how:?}: {right}");
+    }
 }
 
 /// The corner of a room with balls in it: what a scanner there sees of the corner is its inside, and nothing else tells that.

@@ -46,8 +46,7 @@ export interface EstimateOptions {
    * How signs are chosen. Default `'none'`: `x + 2y + 4z >= 0`, deterministic and nothing more. `'consistent'`: one sign for
    * each connected surface, outwards if it is closed, else towards what stands before it; if nothing does, away from its
    * middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal; what one scanner saw from one place faces it. `'outward'`:
-   * the same for closed surfaces; of others every part is turned to what it sees of the open, for heaps of parts and objects
-   * with holes. Both also average normals, with `cell: 'auto'`, where surfaces face apart within the noise, as at edges and on
+   * the same, but never to what stands before it, nor to a scanner: for objects, also with holes. Both also average normals, with `cell: 'auto'`, where surfaces face apart within the noise, as at edges and on
    * rods, and give the narrow sides of ribs and grooves without noise the planes that their points lie on: elsewhere only
    * signs change.
    * `viewpoint`: towards a position, in the coordinates of `positions`. `up`: towards a direction of any length but 0, for

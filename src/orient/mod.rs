@@ -132,7 +132,7 @@ fn surfaces(
     let groups = Groups::of(links, &sights, &patches, &stage.part(0.7..0.85))?;
     let choosing = stage.part(0.85..0.9);
     let (mut signs, looks, scanner) = match options.orient {
-        Orient::Outward => (Signs::outward(groups, &choosing)?, None, None),
+        Orient::Outward => (outward(groups, &patches, &sights, &choosing)?, None, None),
         _ => consistent(groups, &ball, grid, &patches, *noise, &sights, &choosing)?,
     };
     let mut decisions = decide(grid, &patches, &sights, &mut signs)?;
@@ -163,6 +163,15 @@ enum Scanner {
     At(Station),
     /// In this direction.
     Towards(View),
+}
+
+/// Signs that count all of the open, but of what is not closed a share: much of that sees the open with its inside.
+fn outward(groups: Groups, patches: &Patches, sights: &Sights, stage: &Stage) -> Result<Signs, Error> {
+    let mut choice = Choice::of(groups, patches, sights, &stage.part(0.0..0.6))?;
+    if choice.is_any_open() {
+        choice.be_cautious(None, sights, &stage.part(0.6..1.0))?;
+    }
+    Ok(choice.into_signs())
 }
 
 /// Signs that trust no part of the open that may mislead: of what is not closed a share counts, beside what its patches see of

@@ -30,14 +30,6 @@ pub(super) const CLOSED: f64 = 0.6;
 pub(super) const LEAST_PATCHES: u64 = 32;
 const SMALL: f64 = 0.01;
 
-impl Signs {
-    /// Counts all that lies in the open.
-    pub fn outward(groups: Groups, stage: &Stage) -> Result<Self, Error> {
-        let flipped = groups.signs(stage)?;
-        Ok(Self { flipped, components: groups.components(), component: groups.component })
-    }
-}
-
 /// How much of the open is counted.
 pub(super) struct Choice {
     groups: Groups,
