@@ -77,7 +77,8 @@ impl Moments {
         let covariance = Symmetric { diagonal, off };
         let smallest = covariance.smallest_eigenvalue();
         let normal = covariance.normal(smallest, n * n)?.as_vec3();
-        let variation = (smallest / diagonal.element_sum()) as f32;
+        // Of points nearly on a line rounding may leave less than nothing.
+        let variation = (smallest / diagonal.element_sum()).max(0.0) as f32;
         Some(Plane { centroid: (s / n).as_vec3(), normal, variation })
     }
 }
@@ -179,6 +180,24 @@ mod tests {
         let (few, many) = (few.plane().unwrap(), many.plane().unwrap());
         assert!(few.centroid.distance(many.centroid) < 1e-6, "{few:?} {many:?}");
         assert!(few.normal.distance(many.normal) < 1e-6, "{few:?} {many:?}");
+    }
+
+    /// Rounding, which is all that there is across this line, makes its least eigenvalue negative.
+    #[test]
+    fn no_variation_is_less_than_none() {
+        let steps = [
+            [0.0, 0.0, 0.0],
+            [0.08616829, -0.19345093, 0.32818604],
+            [-0.08616829, 0.19346619, -0.32824707],
+            [0.17233849, -0.3869171, 0.6564331],
+            [-0.17233658, 0.38693237, -0.65649414],
+            [0.25850677, -0.5803833, 0.9846802],
+            [-0.25850677, 0.5803833, -0.9846802],
+            [0.34467506, -0.7738342, 1.3129272],
+            [-0.34467506, 0.7738495, -1.3129272],
+        ];
+        let plane = Moments::of(steps.into_iter().map(Vec3::from_array)).plane().unwrap();
+        assert_eq!(plane.variation, 0.0);
     }
 
     #[test]
