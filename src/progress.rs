@@ -71,6 +71,7 @@ impl Stage<'_> {
     }
 
     /// The same for long tasks: `each` of them a thread between two looks at the observer.
+    #[optimize(size)]
     pub fn run_in(&self, each: usize, count: usize, work: &(dyn Fn(usize) + Sync)) -> Result<(), Error> {
         let mut batch = each * parallel::threads();
         let mut done = 0;

@@ -32,6 +32,9 @@ const LEFT: f32 = 0.03;
 /// A face explains at least so many of either.
 const LEAST: f32 = 0.05;
 
+/// A surface with less noise than this, in edges and squared, has none.
+pub(super) const CLEAN: f32 = 1e-5;
+
 /// No noise has a deviation of less than 0.0003 edges.
 const FLOOR: f32 = 1e-7;
 
@@ -74,8 +77,8 @@ struct Face {
 }
 
 impl Face {
-    fn new(normal: Vec3, centre: Vec3, covariance: Matrix) -> Self {
-        Self { plane: normal.extend(-normal.dot(centre)), centre, covariance, ends: [NO_END; MOST - 1] }
+    fn new(plane: Vec4, centre: Vec3, covariance: Matrix) -> Self {
+        Self { plane, centre, covariance, ends: [NO_END; MOST - 1] }
     }
 
     fn normal(&self) -> Vec3 {
@@ -94,7 +97,7 @@ pub(super) struct Faces {
     all: Vec<Face>,
     /// Variance of the points' distances from them.
     pub noise: f32,
-    /// What they are to explain: each with a 1.
+    /// What they are to explain, four at a time: x, y and z.
     places: Vec<Vec4>,
 }
 
@@ -119,12 +122,15 @@ impl Faces {
         let stride = 1 + count / MANY;
         self.places.clear();
         for (shift, points) in level.points_near(bit, near) {
-            self.places.extend(points.iter().step_by(stride).map(|p| (p.local + shift).extend(1.0)));
+            self.places.extend(points.iter().step_by(stride).map(|p| p.lanes() + shift.extend(0.0)));
         }
+        self.turn();
         let own =
             near.iter().find(|near| near.step == Vec3::ZERO).map_or(&[][..], |own| level.points(own.cube as usize));
         let stride = 1 + self.places.len() / SOME;
-        [stride, stride, 1].into_iter().all(|stride| self.fit(stride) && self.end())
+        // Without noise a few tell a plane as well as all.
+        let last = if expected < CLEAN { stride } else { 1 };
+        [stride, stride, last].into_iter().all(|stride| self.fit(stride) && self.end())
             && self.noise <= FIT * expected
             && own.chunks(4).all(|four| {
                 let likelihoods = self.likelihoods(located(four, cube_centre(bit)).0);
@@ -139,13 +145,19 @@ impl Faces {
     fn choose(&mut self, near: &[Near], chosen: &[Chosen]) -> bool {
         let centroid = |near: &Near| near.step + chosen[near.cube as usize].quadric.centre;
         self.places.clear();
-        self.places.extend(near.iter().map(|near| centroid(near).extend(1.0)));
-        let count = near.len() as f32;
-        let gate = GATE * self.noise;
-        let explains = |face: &Face, place: &Vec4| face.plane.dot(*place).powi(2) <= gate;
+        self.places.extend(near.iter().map(|near| centroid(near).extend(0.0)));
+        // What fills up the last four is beyond any plane.
+        self.places.extend([Vec4::INFINITY; 3]);
+        self.turn();
+        let (count, mut left) = (near.len() as f32, near.len() as u32);
+        let gate = Vec4::splat(GATE * self.noise);
+        let explains = |plane: Vec4, &[x, y, z, _]: &[Vec4; 4]| {
+            let height = value(plane, [x, y, z]);
+            (height * height).cmple(gate)
+        };
         self.all.clear();
-        while self.all.len() < MOST && self.places.len() as f32 > LEFT * count {
-            let (mut best, mut most) = (None, (LEAST * count) as usize);
+        while self.all.len() < MOST && left as f32 > LEFT * count {
+            let (mut best, mut most) = (None, (LEAST * count) as u32);
             for near in near {
                 let surface = &chosen[near.cube as usize];
                 let quadric = &surface.quadric;
@@ -155,17 +167,29 @@ impl Faces {
                     continue;
                 }
                 let foot = centroid(near) - quadric.height * quadric.slope;
-                let face = Face::new(quadric.slope, foot, Matrix::default());
-                let explained = self.places.iter().filter(|place| explains(&face, place)).count();
+                let plane = plane(quadric.slope, foot);
+                let explained = self.fours().map(|four| explains(plane, four).bitmask().count_ones()).sum();
                 if explained > most {
-                    (best, most) = (Some(face), explained);
+                    (best, most) = (Some((plane, foot)), explained);
                 }
             }
-            let Some(face) = best else { break };
-            self.places.retain(|place| !explains(&face, place));
-            self.all.push(face);
+            let Some((plane, centre)) = best else { break };
+            for four in self.places.as_chunks_mut().0 {
+                four[0] = Vec4::select(explains(plane, four), Vec4::INFINITY, four[0]);
+            }
+            left -= most;
+            self.all.push(Face::new(plane, centre, Matrix::default()));
         }
-        self.all.len() > 1 && self.places.len() as f32 <= LEFT_CENTROIDS * count
+        self.all.len() > 1 && left as f32 <= LEFT_CENTROIDS * count
+    }
+
+    /// Puts places four at a time.
+    fn turn(&mut self) {
+        self.places.as_chunks_mut().0.iter_mut().for_each(|four| *four = transposed(*four));
+    }
+
+    fn fours(&self) -> std::slice::Iter<'_, [Vec4; 4]> {
+        self.places.as_chunks().0.iter()
     }
 
     /// For each face the sums over each `stride`th four places of their weights, of x, y, z, xx, yy, zz, yz, xz and xy, and of
@@ -173,8 +197,7 @@ impl Faces {
     #[inline(never)]
     fn sums(&self, stride: usize) -> [[Vec4; 11]; MOST] {
         let mut sums = [[Vec4::ZERO; 11]; MOST];
-        for four in self.places.chunks_exact(4).step_by(stride) {
-            let [x, y, z, _] = transposed([four[0], four[1], four[2], four[3]]);
+        for &[x, y, z, _] in self.fours().step_by(stride) {
             let likelihoods = self.likelihoods([x, y, z]);
             let unit = 1.0 / (likelihoods.into_iter().sum::<Vec4>() + NEVER);
             for ((face, likelihood), sums) in self.all.iter().zip(likelihoods).zip(&mut sums) {
@@ -213,7 +236,7 @@ impl Faces {
             }
             let Symmetric { diagonal, off } = covariance;
             let covariance = Matrix { diagonal: diagonal.as_vec3(), off: off.as_vec3() };
-            let face = Face::new(normal, centre, covariance);
+            let face = Face::new(plane(normal, centre), centre, covariance);
             // Over the plane before and over this one: rounding blurs the second where there is hardly any noise.
             squares += (square as f32).min(points as f32 * face.spread(normal)).max(0.0);
             count += points as f32;
@@ -290,6 +313,11 @@ fn is_blunt(a: Vec3, b: Vec3) -> bool {
     a.dot(b).abs() > BLUNT
 }
 
+/// The plane across a unit normal through a place: the height of a point is its product with the point and 1.
+fn plane(normal: Vec3, through: Vec3) -> Vec4 {
+    normal.extend(-normal.dot(through))
+}
+
 /// A linear function at points.
 #[inline(always)]
 fn value(function: Vec4, [x, y, z]: [Vec4; 3]) -> Vec4 {
@@ -313,8 +341,11 @@ mod tests {
                 (place + Vec3::from_array(noise)).extend(1.0)
             })
             .collect();
-        let all = normals.iter().map(|normal| Face::new(*normal, Vec3::ZERO, Matrix::default())).collect();
-        Faces { all, noise: deviation * deviation, places }
+        let all =
+            normals.iter().map(|normal| Face::new(plane(*normal, Vec3::ZERO), Vec3::ZERO, Matrix::default())).collect();
+        let mut faces = Faces { all, noise: deviation * deviation, places };
+        faces.turn();
+        faces
     }
 
     fn direction(faces: &Faces, x: f32, y: f32, z: f32) -> Vec3 {

@@ -11,7 +11,7 @@ use crate::lists::reserve;
 use crate::parallel::Filling;
 use crate::progress::Stage;
 use crate::source::{OtherGrid, Source};
-use glam::{IVec3, Vec3};
+use glam::{DVec3, IVec3, Vec3};
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
@@ -219,9 +219,11 @@ impl Level {
     }
 
     /// The centroid of the points of a cube, against its centre.
+    #[optimize(size)]
     pub fn centroid(&self, cube: usize, bit: u32) -> Vec3 {
-        let centre = cube_centre(bit);
-        Sample::of(self.points(cube).iter().map(|p| Sample::point(p.local - centre))).place
+        let (centre, points) = (cube_centre(bit), self.points(cube));
+        let sum: DVec3 = points.iter().map(|p| (p.local - centre).as_dvec3()).sum();
+        (sum / points.len() as f64).as_vec3()
     }
 
     /// Where a cube lies, in cubes from the first there can be.

@@ -2,7 +2,7 @@
 
 use super::around::{Around, Near};
 use super::choose::Chosen;
-use super::faces::Faces;
+use super::faces::{CLEAN, Faces};
 use super::facets::{Facets, TORN};
 use super::level::{Level, Role};
 use super::matrix::{dot_lanes, times_lanes};
@@ -71,10 +71,6 @@ const WIDE: f32 = 0.1;
 
 /// Where a sheet goes on, so many cubes within two are occupied; small objects have fewer.
 const SHEET: usize = 25;
-
-/// Where a surface may lie across an edge, points tell faces if the cloud has no noise: near by lies a surface with less than
-/// this, in edges and squared.
-const CLEAN: f32 = 1e-5;
 
 /// In an exact cloud a surface with more noise than this, in edges and squared, may lie between two sheets.
 const BETWEEN: f32 = 3e-4;
@@ -170,6 +166,7 @@ impl<'a> Task<'a> {
             let noise = |cube: u32| chosen[cube as usize].flat_noise;
             self.cleanest = (brick, self.around.least(&level.grid, brick, noise));
         }
+        // Elsewhere points tell faces only if the cloud has no noise.
         self.cleanest.1 < CLEAN
     }
 

@@ -124,6 +124,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// The next value as the length of a list of `item`s.
+    #[optimize(size)]
     pub fn length(&mut self, count: Scalar, item: Scalar, element: &Element) -> Result<u64, Error> {
         let start = self.at;
         if self.is_text() {
