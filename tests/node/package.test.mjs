@@ -49,6 +49,12 @@ test('addresses of scripts and modules stand there as plain strings, which every
   assert.deepEqual(found.sort(), ['"js', '"js', '"js', '"js', '"wasm', '"wasm', '"wasm', '"wasm']);
 });
 
+test('a thread has its glue by a static import, because Parcel finds it in no other way', () => {
+  for (const name of ['thread', 'thread-node']) {
+    assert.match(readFileSync(join(home, 'dist', `${name}.js`), 'utf8'), /\bfrom"\.\/threads\/bilinormal\.js"/);
+  }
+});
+
 test('importing does nothing, and a process that is done ends without a word', () => {
   const idle = node(`
     import * as everything from 'bilinormal';
