@@ -124,6 +124,39 @@ test('a page whose policy forbids the worker is told so', async () => {
   await page.close();
 });
 
+test('a script that does not load: the header is named, threads give way to the single build', async () => {
+  const address = await open(project, ISOLATION);
+  const page = await browser.newPage();
+  const ask = async () => {
+    await page.goto(address);
+    await page.waitForFunction(() => window.bilinormal, undefined, { timeout: 10000 });
+    return page.evaluate(async () => {
+      try {
+        const estimator = await window.bilinormal.createEstimator({ threads: 2 });
+        return (await estimator.estimateNormals(new Float32Array(3))).report.fallbackReason;
+      } catch ({ code, message }) {
+        return `${code}: ${message}`;
+      }
+    });
+  };
+  // Playwright sees requests of the page, not those of its workers.
+  const thread = join(home, 'dist', 'thread.js');
+  renameSync(thread, `${thread}.away`);
+  try {
+    assert.equal(await ask(), 'threads did not start: they did not load');
+  } finally {
+    renameSync(`${thread}.away`, thread);
+  }
+  await page.route(/worker\.js/, async (route) => {
+    const response = await route.fetch();
+    const { 'cross-origin-embedder-policy': policy, ...headers } = response.headers();
+    assert.equal(policy, 'require-corp');
+    await route.fulfill({ response, headers });
+  });
+  assert.match(await ask(), /^unsupported: the worker did not start: .*Cross-Origin-Embedder-Policy$/);
+  await page.close();
+});
+
 test('files on another origin', async () => {
   const elsewhere = await open(join(home, 'dist'), anyOrigin);
   const folder = join(project, 'page');
