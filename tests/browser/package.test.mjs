@@ -6,6 +6,7 @@ import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { chromium } from 'playwright-core';
 import { ISOLATION, serve } from '../../scripts/serve.mjs';
+import { read } from '../../scripts/run.mjs';
 import { findBrowser } from '../../scripts/setup.mjs';
 import { sphere } from '../node/clouds.mjs';
 import { installPacked, root } from '../node/packed.mjs';
@@ -121,7 +122,31 @@ test('a page whose policy forbids the worker is told so', async () => {
   );
   assert.equal(code, 'unsupported');
   assert.match(message, /the worker did not start: .*TrustedScriptURL/);
+  const points = await page.evaluate(async () => {
+    window.trustedTypes.createPolicy('default', { createScriptURL: (url) => url });
+    return (await window.bilinormal.estimateNormals(new Float32Array(3))).report.points;
+  });
+  assert.equal(points, 1, 'a default policy lets it pass');
   await page.close();
+});
+
+test('the Content-Security-Policy of docs/embedding.md suffices, for scripts of the own origin and of another', async () => {
+  const [shown] = /A Content-Security-Policy needs .*? besides/s.exec(read('docs/embedding.md'));
+  const [worker, script, connect, blob] = [...shown.matchAll(/`(.*?)`/g)].map(([, directive]) => directive);
+  const folder = join(project, 'policy');
+  mkdirSync(folder);
+  writePage(folder);
+  const check = async (from, directives) => {
+    writeFileSync(join(folder, 'main.js'), `window.bilinormal = await import(${JSON.stringify(from)});`);
+    const policy = ["default-src 'none'", 'img-src data:', ...directives].join('; ');
+    const address = await open(project, { ...ISOLATION, 'Content-Security-Policy': policy });
+    checkIsolated(await use(`${address}policy/`));
+  };
+  await check('../node_modules/bilinormal/dist/index.js', [worker, script, connect]);
+  const elsewhere = await open(join(home, 'dist'), anyOrigin);
+  const all = [worker, script, connect].map((directive) => `${directive} ${elsewhere}`);
+  all[0] += blob.replace(/^worker-src/, '');
+  await check(`${elsewhere}index.js`, all);
 });
 
 test('a script that does not load: the header is named, threads give way to the single build', async () => {
