@@ -270,6 +270,9 @@ test('the point material shows what it says', async () => {
   for (const vertexColors of [false, true]) {
     near((await draw({ color: [200, 100, 50, 255], shading: 'colors', vertexColors })).centre, [200, 100, 50]);
   }
+  // What PLYLoader makes of 200, 100, 50.
+  const linear = { color: [147, 32, 8, 255], shading: 'colors', colorSpace: 'srgb-linear' };
+  near((await draw(linear)).centre, [200, 100, 50]);
   near((await draw({ normal: [1, 0, 0], shading: 'plain' })).centre, [128, 128, 128]);
 
   // Squares cover more than discs; 1 unit at a distance of 2 is a quarter of the height.

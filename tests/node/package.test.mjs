@@ -137,12 +137,13 @@ test('the point material is lit, and its properties can be changed', async (cont
   material.color = '#00ff00';
   assert.equal(material.shading, 'plain');
   assert.equal(material.color.getHexString(), '00ff00');
-  assert.equal(material.backColor, null);
+  assert.deepEqual([material.backColor, material.colorSpace], [null, 'srgb']);
+  material.colorSpace = 'srgb-linear';
   material.backColor = '#0000ff';
   assert.throws(() => (material.shading = 'sparkling'), /sparkling; wanted one of shaded, normals, colors, plain/);
   const copy = material.clone();
   assert.deepEqual([copy.shading, copy.size, copy.pixels, copy.color.getHexString()], ['plain', 0.5, 3, '00ff00']);
-  assert.equal(copy.backColor.getHexString(), '0000ff');
+  assert.deepEqual([copy.backColor.getHexString(), copy.colorSpace], ['0000ff', 'srgb-linear']);
   material.backColor = null;
   assert.deepEqual([material.backColor, copy.backColor.getHexString()], [null, '0000ff']);
   const renderer = {
