@@ -110,11 +110,13 @@ function openQueue(host: Host, options: Omit<Start, 'kind' | 'channel'>) {
     const { simd, reason } = detect();
     if (!simd) throw new BilinormalError('unsupported', reason!);
     let answered = false;
-    const failure = (reason: string) =>
+    // Browsers do not say why a script did not load, and Chromium not even in its console that it lacks the header.
+    const unloaded = 'it did not load; if isolated, see the header Cross-Origin-Embedder-Policy';
+    const failure = (reason?: string) =>
       answered
-        ? new BilinormalError('limit', `wasm broke, most likely out of memory (${reason})`)
-        : new BilinormalError('unsupported', `the worker did not start: ${reason}`);
-    const fail = (reason: string) => {
+        ? new BilinormalError('limit', `wasm broke, likely out of memory (${reason})`)
+        : new BilinormalError('unsupported', `the worker did not start: ${reason || unloaded}`);
+    const fail = (reason?: string) => {
       if (mine === link) crash(failure(reason));
     };
     const name = `${Math.random()}`;

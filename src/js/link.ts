@@ -14,7 +14,7 @@ export const starter =
     // Without a message: the script did not load, or what it sent cannot be read.
     worker.onmessageerror = worker.onerror = (event: any) => {
       event.preventDefault();
-      fail(event.message || 'it did not load');
+      fail(event.message);
     };
     return {
       post: (message) => worker.postMessage(message, buffersOf(message)),

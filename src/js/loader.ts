@@ -37,7 +37,7 @@ export async function load(start: Start, platform: Platform): Promise<Loaded> {
     try {
       return await loadThreads(count, start, platform);
     } catch (error) {
-      reason = `threads did not start: ${(error as Error).message}`;
+      reason = `threads did not start: ${(error as Error).message || 'they did not load'}`;
     }
   }
   return loadSingle(start, platform, { mode: 'single', threads: 1, ...(reason && { fallbackReason: reason }) });

@@ -1,8 +1,13 @@
 // Node's worker threads as links.
+import { Blob } from 'node:buffer';
 import type { Worker } from 'node:worker_threads';
 import { buffersOf } from './buffers.js';
 import { BilinormalError } from './error.js';
 import type { Link } from './protocol.js';
+import { kindOf } from './source.js';
+
+/** Of Blobs that are not Node's, as of jsdom or fetch-blob, nothing would arrive. */
+const isForeign = (value: unknown) => /^(Blob|File)$/.test(kindOf(value)) && !(value instanceof Blob);
 
 export function link(worker: Worker, receive: (message: any) => void, fail: (reason: string) => void): Link {
   worker.on('message', receive);
@@ -11,8 +16,9 @@ export function link(worker: Worker, receive: (message: any) => void, fail: (rea
   worker.on('exit', (code) => fail(`exit code ${code}`));
   worker.unref();
   return {
-    post: (message) => {
+    post: (message: { data?: unknown[] }) => {
       try {
+        if (message.data?.some(isForeign)) throw new Error("this Blob is not one of Node's");
         worker.postMessage(message, buffersOf(message));
       } catch (error) {
         // The Blobs that `fs.openAsBlob` makes cannot go to a worker.

@@ -27,7 +27,7 @@ export async function startWorkers(
   let timer;
   try {
     await new Promise<void>((resolve, reject) => {
-      const fail = (reason: string) => reject(new Error(reason));
+      const fail = (reason?: string) => reject(new Error(reason));
       timer = setTimeout(fail, patience * 1000, `no answer in ${patience} s`);
       for (let i = waiting; i--;) {
         const link = pool.start!((reason?: string) => (reason ? fail(reason) : --waiting || resolve()), fail);

@@ -11,8 +11,8 @@ export interface Link {
   end(): void;
 }
 
-/** Starts a worker. `fail` hears what goes wrong in it as a whole, with the reason as text. */
-export type StartWorker = (receive: (message: any) => void, fail: (reason: string) => void) => Link;
+/** Starts a worker. `fail` hears what goes wrong in it as a whole, and why, but for a script that did not load. */
+export type StartWorker = (receive: (message: any) => void, fail: (reason?: string) => void) => Link;
 
 /** Bytes on their way into wasm memory: a Blob to be streamed, bytes to be copied, or the address of a local file. */
 export type Bytes = Blob | Uint8Array | string;

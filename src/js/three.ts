@@ -7,6 +7,9 @@ import { Color, type ColorRepresentation, ShaderMaterial, Vector2, type WebGLRen
  */
 export type Shading = 'shaded' | 'normals' | 'colors' | 'plain';
 
+/** `srgb`: as files have them, and `PointCloud.colors`; `srgb-linear`: as three's own loaders give them. */
+export type ColorSpace = 'srgb' | 'srgb-linear';
+
 export interface PointMaterialOptions {
   /** Default `'shaded'`. */
   shading?: Shading;
@@ -25,6 +28,8 @@ export interface PointMaterialOptions {
    * both sides look the same.
    */
   backColor?: ColorRepresentation | null;
+  /** What the attribute `color` holds. Default `'srgb'`. */
+  colorSpace?: ColorSpace;
 }
 
 const shadings: readonly Shading[] = ['shaded', 'normals', 'colors', 'plain'];
@@ -68,6 +73,7 @@ uniform vec3 back;
 uniform bool hasBack;
 uniform float ambient;
 uniform bool isRound;
+uniform bool isLinear;
 varying vec3 vNormal;
 varying vec3 vColor;
 varying vec3 vToCamera;
@@ -75,7 +81,7 @@ varying vec3 vToCamera;
 #include <logdepthbuf_pars_fragment>
 #include <clipping_planes_pars_fragment>
 
-// Colours of files, and of normals, are meant as they stand: sRGB.
+// Colours of files, and of normals, are meant as they stand: sRGB. Three's loaders have made them linear.
 vec3 linear(vec3 srgb) {
   return mix(srgb / 12.92, pow((srgb + 0.055) / 1.055, vec3(2.4)), step(0.04045, srgb));
 }
@@ -96,7 +102,7 @@ void main() {
   } else if (shading == 1) {
     shown = linear(0.5 + 0.5 * vNormal);
   } else if (shading == 2) {
-    shown = linear(vColor);
+    shown = isLinear ? vColor : linear(vColor);
   }
   gl_FragColor = vec4(shown, 1.0);
   #include <colorspace_fragment>
@@ -105,8 +111,8 @@ void main() {
 
 /**
  * A material for `Points` whose geometry has the attributes `position`, `normal` (three floats; missing or zero is
- * neither lit nor dark) and `color` (three or four numbers, sRGB; `PointCloud.colors` fits as
- * `new BufferAttribute(colors, 4, true)`; missing is white). For `WebGLRenderer`.
+ * neither lit nor dark) and `color` (three or four numbers; `PointCloud.colors` fits as
+ * `new BufferAttribute(colors, 4, true)`; those of three's loaders with `colorSpace`; missing is white). For `WebGLRenderer`.
  */
 export class PointMaterial extends ShaderMaterial {
   constructor(options: PointMaterialOptions = {}) {
@@ -126,11 +132,13 @@ export class PointMaterial extends ShaderMaterial {
         pixels: { value: pixels },
         pixelRatio: { value: 1 },
         isRound: { value: round },
+        isLinear: { value: false },
         viewportHeight: { value: 1 },
       },
     });
     this.shading = shading;
     this.backColor = options.backColor ?? null;
+    this.colorSpace = options.colorSpace ?? 'srgb';
   }
 
   get shading(): Shading {
@@ -155,6 +163,13 @@ export class PointMaterial extends ShaderMaterial {
   set backColor(color: ColorRepresentation | null) {
     this.uniforms.hasBack!.value = color !== null;
     if (color !== null) this.uniforms.back!.value.set(color);
+  }
+
+  get colorSpace(): ColorSpace {
+    return this.uniforms.isLinear!.value ? 'srgb-linear' : 'srgb';
+  }
+  set colorSpace(space: ColorSpace) {
+    this.uniforms.isLinear!.value = space === 'srgb-linear';
   }
 
   get size(): number {

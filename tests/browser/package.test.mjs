@@ -6,6 +6,7 @@ import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { chromium } from 'playwright-core';
 import { ISOLATION, serve } from '../../scripts/serve.mjs';
+import { read } from '../../scripts/run.mjs';
 import { findBrowser } from '../../scripts/setup.mjs';
 import { sphere } from '../node/clouds.mjs';
 import { installPacked, root } from '../node/packed.mjs';
@@ -121,6 +122,63 @@ test('a page whose policy forbids the worker is told so', async () => {
   );
   assert.equal(code, 'unsupported');
   assert.match(message, /the worker did not start: .*TrustedScriptURL/);
+  const points = await page.evaluate(async () => {
+    window.trustedTypes.createPolicy('default', { createScriptURL: (url) => url });
+    return (await window.bilinormal.estimateNormals(new Float32Array(3))).report.points;
+  });
+  assert.equal(points, 1, 'a default policy lets it pass');
+  await page.close();
+});
+
+test('the Content-Security-Policy of docs/embedding.md suffices, for scripts of the own origin and of another', async () => {
+  const [shown] = /A Content-Security-Policy needs .*? besides/s.exec(read('docs/embedding.md'));
+  const [worker, script, connect, blob] = [...shown.matchAll(/`(.*?)`/g)].map(([, directive]) => directive);
+  const folder = join(project, 'policy');
+  mkdirSync(folder);
+  writePage(folder);
+  const check = async (from, directives) => {
+    writeFileSync(join(folder, 'main.js'), `window.bilinormal = await import(${JSON.stringify(from)});`);
+    const policy = ["default-src 'none'", 'img-src data:', ...directives].join('; ');
+    const address = await open(project, { ...ISOLATION, 'Content-Security-Policy': policy });
+    checkIsolated(await use(`${address}policy/`));
+  };
+  await check('../node_modules/bilinormal/dist/index.js', [worker, script, connect]);
+  const elsewhere = await open(join(home, 'dist'), anyOrigin);
+  const all = [worker, script, connect].map((directive) => `${directive} ${elsewhere}`);
+  all[0] += blob.replace(/^worker-src/, '');
+  await check(`${elsewhere}index.js`, all);
+});
+
+test('a script that does not load: the header is named, threads give way to the single build', async () => {
+  const address = await open(project, ISOLATION);
+  const page = await browser.newPage();
+  const ask = async () => {
+    await page.goto(address);
+    await page.waitForFunction(() => window.bilinormal, undefined, { timeout: 10000 });
+    return page.evaluate(async () => {
+      try {
+        const estimator = await window.bilinormal.createEstimator({ threads: 2 });
+        return (await estimator.estimateNormals(new Float32Array(3))).report.fallbackReason;
+      } catch ({ code, message }) {
+        return `${code}: ${message}`;
+      }
+    });
+  };
+  // Playwright sees requests of the page, not those of its workers.
+  const thread = join(home, 'dist', 'thread.js');
+  renameSync(thread, `${thread}.away`);
+  try {
+    assert.equal(await ask(), 'threads did not start: they did not load');
+  } finally {
+    renameSync(`${thread}.away`, thread);
+  }
+  await page.route(/worker\.js/, async (route) => {
+    const response = await route.fetch();
+    const { 'cross-origin-embedder-policy': policy, ...headers } = response.headers();
+    assert.equal(policy, 'require-corp');
+    await route.fulfill({ response, headers });
+  });
+  assert.match(await ask(), /^unsupported: the worker did not start: .*Cross-Origin-Embedder-Policy$/);
   await page.close();
 });
 
@@ -212,6 +270,9 @@ test('the point material shows what it says', async () => {
   for (const vertexColors of [false, true]) {
     near((await draw({ color: [200, 100, 50, 255], shading: 'colors', vertexColors })).centre, [200, 100, 50]);
   }
+  // What PLYLoader makes of 200, 100, 50.
+  const linear = { color: [147, 32, 8, 255], shading: 'colors', colorSpace: 'srgb-linear' };
+  near((await draw(linear)).centre, [200, 100, 50]);
   near((await draw({ normal: [1, 0, 0], shading: 'plain' })).centre, [128, 128, 128]);
 
   // Squares cover more than discs; 1 unit at a distance of 2 is a quarter of the height.

@@ -438,6 +438,8 @@ test('wrong arguments are input errors that say what came and what was wanted', 
   locked.body.getReader();
   const circular = {};
   circular.scale = circular;
+  // As those of jsdom, or of fetch-blob.
+  const foreignBlob = { [Symbol.toStringTag]: 'Blob', size: 3 };
   const blobOfFile = await openAsBlob(fileURLToPath(import.meta.url));
   const cases = [
     [() => estimateNormals([1, 2, 3]), /positions is Array\(3\); wanted a Float32Array or Float64Array/],
@@ -504,6 +506,8 @@ test('wrong arguments are input errors that say what came and what was wanted', 
     [() => estimateNormals(positions, { orient: Symbol('up') }), /orient is Symbol\(up\); wanted plain data/],
     [() => readPointCloud(locked), /locked/],
     [() => readPointCloud(blobOfFile), /wanted its bytes, or the URL of the file/],
+    [() => readPointCloud(foreignBlob), /not one of Node's; wanted its bytes, or the URL of the file/],
+    [() => writePly(foreignBlob, {}), /not one of Node's; wanted its bytes/],
   ];
   for (const [call, message] of cases) await assert.rejects(call, failing('input', message), `${call}`);
   await assert.rejects(

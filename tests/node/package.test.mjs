@@ -49,6 +49,12 @@ test('addresses of scripts and modules stand there as plain strings, which every
   assert.deepEqual(found.sort(), ['"js', '"js', '"js', '"js', '"wasm', '"wasm', '"wasm', '"wasm']);
 });
 
+test('a thread has its glue by a static import, because Parcel finds it in no other way', () => {
+  for (const name of ['thread', 'thread-node']) {
+    assert.match(readFileSync(join(home, 'dist', `${name}.js`), 'utf8'), /\bfrom"\.\/threads\/bilinormal\.js"/);
+  }
+});
+
 test('importing does nothing, and a process that is done ends without a word', () => {
   const idle = node(`
     import * as everything from 'bilinormal';
@@ -131,12 +137,13 @@ test('the point material is lit, and its properties can be changed', async (cont
   material.color = '#00ff00';
   assert.equal(material.shading, 'plain');
   assert.equal(material.color.getHexString(), '00ff00');
-  assert.equal(material.backColor, null);
+  assert.deepEqual([material.backColor, material.colorSpace], [null, 'srgb']);
+  material.colorSpace = 'srgb-linear';
   material.backColor = '#0000ff';
   assert.throws(() => (material.shading = 'sparkling'), /sparkling; wanted one of shaded, normals, colors, plain/);
   const copy = material.clone();
   assert.deepEqual([copy.shading, copy.size, copy.pixels, copy.color.getHexString()], ['plain', 0.5, 3, '00ff00']);
-  assert.equal(copy.backColor.getHexString(), '0000ff');
+  assert.deepEqual([copy.backColor.getHexString(), copy.colorSpace], ['0000ff', 'srgb-linear']);
   material.backColor = null;
   assert.deepEqual([material.backColor, copy.backColor.getHexString()], [null, '0000ff']);
   const renderer = {
