@@ -1141,7 +1141,39 @@ test('what a depth camera saw stands upright', async () => {
   }
 });
 
-const AERIAL = join(data, 'scans', 'las_ahn3_cropped.ply.gz');
+test('what stands along z stands upright', async () => {
+  page = await browser.openPage(browser.isolated);
+  // A table: its legs make it taller than what is flat, and it would fall over on its side.
+  const table = [-2, 2].flatMap((x) => [-3, 3].map((y) => [x, y, 0])).concat([-1, 1].map((y) => [0, y, 4]));
+  for (const [name, centres, up] of [
+    ['z.ply', table, 'z'],
+    ['y.ply', table.map(([x, y, z]) => [y, z, x]), 'y'],
+  ]) {
+    await drop(page, name, spherePly(6_000, { centres }));
+    await result(page, name);
+    assert.equal(await upAxis().inputValue(), up, name);
+  }
+});
+
+const SCANS = join(data, 'scans');
+test('real scans stand upright', { skip: !existsSync(SCANS) && `no ${SCANS}` }, async () => {
+  page = await browser.openPage(browser.isolated);
+  for (const [name, up] of [
+    ['cgal_building.ply', 'z'],
+    ['probreg_horse.ply', 'z'],
+    ['potree_lion_takanawa_normals_be.ply.gz', 'z'],
+    ['stanford_bun000_raw.ply', 'y'],
+    ['igea.ply', 'y'],
+    ['cilantro_frame_1.ply', '-y'],
+  ]) {
+    const bytes = readFileSync(join(SCANS, name));
+    await choose(page, name, name.endsWith('.gz') ? gunzipSync(bytes) : bytes);
+    await result(page, name);
+    assert.equal(await upAxis().inputValue(), up, name);
+  }
+});
+
+const AERIAL = join(SCANS, 'las_ahn3_cropped.ply.gz');
 test('a real aerial scan of 849 thousand points', { skip: !existsSync(AERIAL) && `no ${AERIAL}` }, async () => {
   page = await browser.openPage(browser.isolated);
   await choose(page, 'aerial.ply', gunzipSync(readFileSync(AERIAL)));

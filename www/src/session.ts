@@ -2,12 +2,13 @@
 // viewer.setNormals -> report. One job runs at a time; a new one cancels it. Curvature is computed while it is shown.
 import { estimateNormals, readPointCloud, writePly, type EstimateOptions } from 'bilinormal';
 import { scannerOf } from '../../src/js/scanner';
-import { boundsOf, guessUp } from './bounds';
+import { boundsOf } from './bounds';
 import { compare } from './compare';
 import { measure } from './format';
 import { METHODS, askedBy, hasSurfaces, orientOf, parseOptions } from './options';
 import { colorsOf } from './ramp';
 import { UNTURNED, type NormalSource, type State, type Store, type Turned } from './state';
+import { guessUp } from './upright';
 import type { Viewer } from './viewer';
 import { warmingCloud } from './warming';
 
@@ -106,7 +107,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
     const bounds = boundsOf(cloud.positions);
     if (!bounds) throw new Error('no point of the file has finite coordinates');
     const scanner = scannerOf(cloud);
-    const up = guessUp(bounds, cloud.origin, scanner);
+    const up = guessUp(cloud.positions, bounds, cloud.origin, scanner);
     const hasColors = cloud.colors !== undefined;
     const shading = store.state.shading === 'colors' && !hasColors ? 'shaded' : store.state.shading;
     // Gaussian splats bring zeros.
