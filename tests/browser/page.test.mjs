@@ -169,7 +169,7 @@ test('what is no scan stops no work', async () => {
   await page.getByRole('button', { name: 'Re-run' }).click();
   await page.locator('#job').waitFor();
   await drop(page, 'notes.txt', Buffer.from('Milk, bread'));
-  await page.getByText('Only PLY files can be opened; notes.txt is none').waitFor();
+  await page.getByText(/^notes\.txt is not a PLY file\. .* The work goes on\.$/).waitFor();
   assert.ok(await page.locator('#job').isVisible());
   assert.equal(await page.locator('#name').textContent(), 'ball.ply');
   // A scan does, also where it begins with a byte order mark and with capitals.
@@ -193,7 +193,7 @@ test('a file that is too large for one buffer says so, and one that is no scan s
   page = await browser.openPage(browser.isolated);
   for (const [name, begin, message] of [
     ['city.ply', 'ply\nformat ascii 1.0\n', 'city.ply: the file has 2.25 GiB, and up to 2 can be opened; '],
-    ['city.las', 'LASF', 'Only PLY files can be opened; city.las is not a PLY file. '],
+    ['city.las', 'LASF', 'city.las is a LAS or LAZ file. Only PLY'],
   ]) {
     // One without its bytes: nothing may ask for more than the first of them.
     await page.evaluate(
@@ -234,15 +234,15 @@ test('a bad file gives a message that can be read, and the cloud before stays', 
   await drop(page, 'photo.ply', Buffer.from('GIF89a, not a scan'));
   const alert = page.getByRole('alert').filter({ hasText: 'photo.ply' });
   await alert.waitFor();
-  assert.match(
-    await alert.textContent(),
-    /^Only PLY files can be opened; photo\.ply is not .*GIF89a.*'\. CloudCompare/,
-  );
+  assert.match(await alert.textContent(), /^photo\.ply is not a PLY file\. Only PLY .* CloudCompare/);
   assert.ok(await page.locator('#start').isVisible());
-  // What to do is told once: by the page, or with what the file is.
+  // What to do depends on what it is, not on the words of the reader.
   for (const [name, bytes, remedy] of [
-    ['flight.las', 'LASF\0\0\0\0', /a LAS or LAZ file\. CloudCompare .* save scans as PLY\.$/],
-    ['ball.ply.gz', '\x1f\x8b\x08', /a gzip file; unpack it first$/],
+    ['flight.las', 'LASF\0\0\0\0', /is a LAS or LAZ file\. .*CloudCompare .* save scans as PLY\.$/],
+    ['ball.ply.gz', '\x1f\x8b\x08', /is packed with gzip\. Unpack it, /],
+    ['castle.spz', '\x1f\x8b\x08', /holds Gaussian splats\. .*SuperSplat.* saves splats as PLY\.$/],
+    ['utf16.ply', '\xff\xfep\0l\0y\0', /is text in UTF-16\. Save it as ASCII or UTF-8\.$/],
+    ['nothing.ply', '', /is empty\.$/],
   ]) {
     await drop(page, name, Buffer.from(bytes, 'latin1'));
     await page.getByRole('alert').filter({ hasText: name }).waitFor();

@@ -1,9 +1,10 @@
 // What a person can have done, as one flow: file -> readPointCloud -> estimateNormals, meanwhile viewer.show ->
 // viewer.setNormals -> report. One job runs at a time; a new one cancels it. Curvature is computed while it is shown.
-import { estimateNormals, readPointCloud, writePly, type EstimateOptions } from 'bilinormal';
+import { estimateNormals, readPointCloud, writePly, type EstimateOptions, type PointCloud } from 'bilinormal';
 import { scannerOf } from '../../src/js/scanner';
 import { boundsOf } from './bounds';
 import { compare } from './compare';
+import { Foreign, foreign } from './foreign';
 import { measure } from './format';
 import { METHODS, askedBy, hasSurfaces, orientOf, parseOptions } from './options';
 import { colorsOf } from './ramp';
@@ -34,8 +35,6 @@ export interface Session {
 }
 
 const SAMPLE_POINTS = 500_000;
-const ONLY_PLY = 'Only PLY files can be opened';
-const REMEDY = 'CloudCompare and MeshLab, among others, save scans as PLY.';
 /** No larger file goes into one buffer of wasm. */
 const FILE_MOST = 2 ** 31 - 1;
 /** The surface of a point without a normal. */
@@ -98,9 +97,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
 
   async function show(file: File, step: Step): Promise<void> {
     const started = performance.now();
-    // Refused there too, as data without memory for it, whatever they are.
-    if (file.size > FILE_MOST) throw new Error((await beginsAsPly(file)) ? tooLarge(file) : 'not a PLY file');
-    const cloud = await readPointCloud(file, { signal: step.signal, onProgress: step.begin(`Reading ${file.name}`) });
+    const cloud = await read(file, step);
     step.signal.throwIfAborted();
     if (cloud.count === 0) throw new Error('the file holds no points');
     const readMilliseconds = performance.now() - started;
@@ -219,8 +216,9 @@ export function createSession(store: Store, viewer: Viewer): Session {
 
     async open(file) {
       // What was dropped by mistake stops no work, unless that ends meanwhile.
-      if (current && !(await beginsAsPly(file)) && current) {
-        store.set({ error: `${ONLY_PLY}; ${file.name} is none, so the work goes on` });
+      const reason = current && (await foreign(file));
+      if (reason && current) {
+        store.set({ error: `${messageOf(file.name, reason)} The work goes on.` });
         return;
       }
       await run(file.name, async (step) => {
@@ -300,12 +298,15 @@ function negate(normals: Float32Array, components?: Uint32Array, surface?: numbe
   }
 }
 
-/** As the reader takes it: in any case, and after a byte order mark, which `text` drops. What cannot be read says so then. */
-async function beginsAsPly(file: File): Promise<boolean> {
+async function read(file: File, { signal, begin }: Step): Promise<PointCloud> {
+  const onProgress = begin(`Reading ${file.name}`);
   try {
-    return /^ply/i.test(await file.slice(0, 6).text());
-  } catch {
-    return true;
+    // Refused there too, as data without memory for it.
+    if (file.size > FILE_MOST) throw new Error(tooLarge(file));
+    return await readPointCloud(file, { signal, onProgress });
+  } catch (error) {
+    // Which says what it is, and what to do with it.
+    throw (await foreign(file)) ?? error;
   }
 }
 
@@ -329,13 +330,8 @@ function download(blob: Blob, name: string): void {
 }
 
 function messageOf(trouble: string, error: unknown): string {
-  // Where a file begins tells nothing.
-  const message = (error instanceof Error ? error.message : String(error)).replace(/^byte 0: /, '');
-  if (!message.startsWith('not a PLY file')) return `${trouble}: ${message}`;
-  const what = message.replace(/; wanted 'ply' as the first line$/, '');
-  // What is packed, and text of another kind, comes with a remedy of its own.
-  const isTold = /^not a PLY file but .*[;,]/.test(what);
-  return `${ONLY_PLY}; ${trouble} is ${what}${isTold ? '' : `. ${REMEDY}`}`;
+  const message = error instanceof Error ? error.message : String(error);
+  return `${trouble}${error instanceof Foreign ? '' : ':'} ${message}`;
 }
 
 function tooLarge({ size }: File): string {
