@@ -180,13 +180,23 @@ test('what is no scan stops no work', async () => {
 
 test('of several files the first scan is taken, and folders are refused', async () => {
   page = await browser.openPage(browser.isolated);
-  await drop(page, 'ball.PLY', spherePly(5_000), ['photo.jpg']);
-  await page.waitForFunction(() => document.querySelector('#facts').childElementCount > 0);
-  assert.match((await result(page, 'ball.PLY')).error, /One file at a time .* ball\.PLY/);
+  // Those before it are empty, whatever their names: nothing to be told of.
+  await drop(page, 'ball.PLY', spherePly(5_000), { before: ['photo.jpg', 'empty.ply'] });
+  assert.equal((await result(page, 'ball.PLY')).error, undefined);
+  assert.ok(await page.locator('#note').isHidden());
+  await drop(page, 'first.ply', spherePly(5_000), { before: ['notes.txt'], after: ['second.ply', 'third.ply'] });
+  assert.equal((await result(page, 'first.ply')).error, undefined);
+  const note = page.locator('#note').getByText('One scan is shown at a time: the first of 3.');
+  assert.ok(await note.isVisible());
+  await page.getByRole('button', { name: 'Dismiss the note' }).click();
+  assert.ok(await note.isHidden());
+  // Without a scan among them, what is there stays.
+  await drop(page, 'notes.txt', Buffer.alloc(0), { after: ['photo.jpg'] });
+  assert.match((await result(page, 'first.ply')).error, /^notes\.txt is empty/);
   // As a browser tells a folder, which cannot be made in a test.
   await page.evaluate(() => (DataTransferItem.prototype.webkitGetAsEntry = () => ({ isDirectory: true })));
   await drop(page, 'scans', Buffer.alloc(0));
-  assert.match((await result(page, 'ball.PLY')).error, /^Folders are not taken/);
+  assert.match((await result(page, 'first.ply')).error, /^Folders are not taken/);
 });
 
 test('a file that is too large for one buffer says so, and one that is no scan says that', async () => {

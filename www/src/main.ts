@@ -57,13 +57,13 @@ function start(viewer: Viewer): void {
     },
     cancel: () => session.cancel(),
     dismiss: () => store.set({ error: undefined }),
+    read: () => store.set({ note: undefined }),
   };
   for (const button of document.querySelectorAll<HTMLButtonElement>('[data-do]')) {
     button.addEventListener('click', actions[button.dataset['do']!]!);
   }
   input.addEventListener('change', () => {
-    const file = input.files?.[0];
-    if (file) void session.open(file);
+    void session.open([...(input.files ?? [])]);
     // The same file chosen again is a change again.
     input.value = '';
   });
@@ -159,12 +159,9 @@ function takeDrops(session: Session): void {
     target.classList.remove('dropping');
     const items = [...(event.dataTransfer?.items ?? [])].filter(({ kind }) => kind === 'file');
     const files = items.filter((item) => !item.webkitGetAsEntry()?.isDirectory).map((item) => item.getAsFile()!);
-    const file = files.find(({ name }) => /\.ply$/i.test(name)) ?? files[0];
-    if (file) void session.open(file);
-    if (items.length === 0)
-      store.set({ error: 'That was not a file: drop a .ply file from a folder of this machine.' });
-    else if (!file) store.set({ error: 'Folders are not taken: drop a .ply file from it.' });
-    else if (items.length > 1) store.set({ error: `One file at a time is shown: ${file.name} was taken.` });
+    if (files.length > 0) void session.open(files);
+    else if (items.length > 0) store.set({ error: 'Folders are not taken: drop a .ply file from it.' });
+    else store.set({ error: 'That was not a file: drop a .ply file from a folder of this machine.' });
   });
 }
 

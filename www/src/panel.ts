@@ -87,6 +87,8 @@ export function showState(store: Store): void {
 
     showOptions(state, busy);
     showError(start.hidden ? error : undefined);
+    element('#note').hidden = state.note === undefined;
+    write('#note p', state.note ?? '');
     showJob(state);
     const same =
       before?.scan === scan &&
@@ -105,10 +107,11 @@ function moveFocus({ scan, job }: State): void {
   element(next).focus();
 }
 
-/** For those who hear the page: what begins, and what a flip has done. */
-function tell({ job, flipped, turnedSurfaces }: State, before: State | undefined): void {
+/** For those who hear the page: what begins, what a flip has done, and what else there is to know. */
+function tell({ job, flipped, turnedSurfaces, note }: State, before: State | undefined): void {
   const told = element('#told');
-  if (before?.job?.title !== job?.title) told.textContent = job?.title ?? '';
+  if (note && before?.note !== note) told.textContent = note;
+  else if (before?.job?.title !== job?.title) told.textContent = job?.title ?? '';
   else if (!before || job) return;
   else if (before.flipped !== flipped) told.textContent = flipped ? 'All flipped' : 'All flipped back';
   else if (before.turnedSurfaces !== turnedSurfaces) {

@@ -5,7 +5,7 @@ import { scannerOf } from '../../src/js/scanner';
 import { boundsOf } from './bounds';
 import { compare } from './compare';
 import { Foreign, foreign } from './foreign';
-import { measure } from './format';
+import { count, measure } from './format';
 import { METHODS, askedBy, hasSurfaces, orientOf, parseOptions } from './options';
 import { colorsOf } from './ramp';
 import { UNTURNED, type NormalSource, type State, type Store, type Turned } from './state';
@@ -16,7 +16,8 @@ import { warmingCloud } from './warming';
 export interface Session {
   /** Starts the workers and lets the browser compile them for speed, so that the first file need not wait for that. */
   warm(): void;
-  open(file: File): Promise<void>;
+  /** The first scan of these files. */
+  open(files: File[]): Promise<void>;
   openSample(): Promise<void>;
   /** Computes the normals of the cloud on the screen again, with the options that are set now. */
   estimate(): Promise<void>;
@@ -73,7 +74,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
     const tell = (title: string, phase: string, fraction: number | undefined) => {
       if (current === mine) store.set({ job: { title, phase, fraction } });
     };
-    store.set({ error: undefined });
+    store.set({ error: undefined, note: undefined });
     try {
       await work({
         signal: mine.signal,
@@ -214,7 +215,10 @@ export function createSession(store: Store, viewer: Viewer): Session {
       estimateNormals(warmingCloud(), { orient: 'consistent', components: true }).catch(ignore);
     },
 
-    async open(file) {
+    async open(files) {
+      const scans = files.length > 1 ? await onlyScans(files) : files;
+      const file = scans[0] ?? files[0];
+      if (!file) return;
       // What was dropped by mistake stops no work, unless that ends meanwhile.
       const reason = current && (await foreign(file));
       if (reason && current) {
@@ -223,6 +227,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
       }
       await run(file.name, async (step) => {
         await show(file, step);
+        if (scans.length > 1) store.set({ note: `One scan is shown at a time: the first of ${count(scans.length)}.` });
         await shade(step);
       });
     },
@@ -296,6 +301,12 @@ function negate(normals: Float32Array, components?: Uint32Array, surface?: numbe
   for (let i = 0; i < normals.length; i++) {
     if (components?.[Math.floor(i / 3)] === surface) normals[i] = 0 - normals[i]!;
   }
+}
+
+/** Those that begin as PLY files do. */
+async function onlyScans(files: File[]): Promise<File[]> {
+  const reasons = await Promise.all(files.map(foreign));
+  return files.filter((_, i) => !reasons[i]);
 }
 
 async function read(file: File, { signal, begin }: Step): Promise<PointCloud> {

@@ -56,6 +56,8 @@ export interface State extends OptionsForm, Turned {
   comparison: Comparison | undefined;
   job: Job | undefined;
   error: string | undefined;
+  /** What else there is to know: nothing went wrong. */
+  note: string | undefined;
   shading: Shading;
   source: NormalSource;
   /** Whether what points away from the camera has a colour of its own. */
@@ -84,6 +86,7 @@ export function createStore(): Store {
     comparison: undefined,
     job: undefined,
     error: undefined,
+    note: undefined,
     shading: 'shaded',
     source: 'computed',
     backs: false,
