@@ -789,14 +789,57 @@ test('a flip turns what is saved, again undoes it, and curvature keeps it', asyn
   for (let presses = 1; presses <= 4; presses++) await page.keyboard.press('Control+z');
   assert.equal(await flip.getAttribute('aria-pressed'), 'false');
   assert.ok(!(await backs.isChecked()), 'the flip had switched it on');
+});
 
-  // What is computed anew is as its orientation promises, and says so.
-  assert.doesNotMatch(await page.locator('#facts').innerText(), /were reset/);
+test('flips that a new result or another file takes away can be brought back', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(
+    page,
+    'balls.ply',
+    spherePly(20_000, {
+      centres: [
+        [-1.5, 0, 0],
+        [1.5, 0, 0],
+      ],
+    }),
+  );
+  await result(page, 'balls.ply');
+  const flip = page.getByRole('button', { name: 'Flip all' });
+  const note = page.locator('#note');
+  const isFlipped = async () => (await flip.getAttribute('aria-pressed')) === 'true';
   await flip.click();
-  const { saved: anew, facts } = await oriented('Outward');
-  assert.deepEqual(anew, before);
-  assert.match(facts, /flips by hand were reset/);
-  assert.equal(await flip.getAttribute('aria-pressed'), 'false');
+  const turned = readSaved((await save(page)).bytes);
+
+  await oriented('As found', 'balls.ply');
+  assert.ok(!(await isFlipped()));
+  assert.match(await note.innerText(), /^Re-run has undone your flips\./);
+  // Computed again as it was, signs and all.
+  await page.keyboard.press('Control+z');
+  await page.waitForFunction(() => document.querySelector('[data-do=flip]').ariaPressed === 'true');
+  await result(page, 'balls.ply');
+  assert.ok(await note.isHidden());
+  assert.ok(await orientation('Consistent').isChecked());
+  assert.deepEqual(readSaved((await save(page)).bytes), turned);
+
+  // What is saved is not lost.
+  await drop(page, 'other.ply', spherePly(5_000));
+  await result(page, 'other.ply');
+  assert.ok(await note.isHidden());
+  await flip.click();
+  await drop(page, 'balls.ply', spherePly(5_000));
+  await result(page, 'balls.ply');
+  assert.match(await note.innerText(), /^Your flips of other\.ply were not saved\./);
+  assert.ok(!(await isFlipped()));
+  await note.getByRole('button', { name: 'Bring back' }).click();
+  await result(page, 'other.ply');
+  assert.ok(await isFlipped());
+  assert.ok(await note.isHidden());
+  // And can be undone as before.
+  await page.keyboard.press('Control+z');
+  assert.ok(!(await isFlipped()));
+  await drop(page, 'balls.ply', spherePly(5_000));
+  await result(page, 'balls.ply');
+  assert.ok(await note.isHidden());
 });
 
 test('one surface is turned by a click, or by Enter in the middle of the view', async () => {

@@ -87,8 +87,7 @@ export function showState(store: Store): void {
 
     showOptions(state, busy);
     showError(start.hidden ? error : undefined);
-    element('#note').hidden = state.note === undefined;
-    write('#note p', state.note ?? '');
+    showNote(state.note, busy);
     showJob(state);
     const same =
       before?.scan === scan &&
@@ -110,7 +109,7 @@ function moveFocus({ scan, job }: State): void {
 /** For those who hear the page: what begins, what a flip has done, and what else there is to know. */
 function tell({ job, flipped, turnedSurfaces, note }: State, before: State | undefined): void {
   const told = element('#told');
-  if (note && before?.note !== note) told.textContent = note;
+  if (note && before?.note !== note) told.textContent = note.text;
   else if (before?.job?.title !== job?.title) told.textContent = job?.title ?? '';
   else if (!before || job) return;
   else if (before.flipped !== flipped) told.textContent = flipped ? 'All flipped' : 'All flipped back';
@@ -120,7 +119,7 @@ function tell({ job, flipped, turnedSurfaces, note }: State, before: State | und
 }
 
 /** What starts a job does nothing while one runs, but keeps the focus of the keyboard. */
-const rest = (button: HTMLButtonElement, busy: boolean) => button.setAttribute('aria-disabled', String(busy));
+const rest = (button: HTMLElement, busy: boolean) => button.setAttribute('aria-disabled', String(busy));
 
 const radio = (name: string, value: string) => element<HTMLInputElement>(`input[name="${name}"][value="${value}"]`);
 
@@ -171,6 +170,14 @@ function showError(error: string | undefined): void {
   const box = element('#error');
   box.hidden = error === undefined;
   element('#error p').textContent = error ?? '';
+}
+
+function showNote(note: State['note'], busy: boolean): void {
+  element('#note').hidden = note === undefined;
+  write('#note p', note?.text ?? '');
+  const back = element('#note [data-do=back]');
+  back.hidden = !note?.isOfFlips;
+  rest(back, busy);
 }
 
 function showJob({ job }: State): void {
@@ -298,7 +305,6 @@ function showResult(state: State): void {
     ...signsOf(report, state),
     fact(count(report.unresolved), 'without a normal'),
     counted(report.threads, 'thread'),
-    ...(state.wereReset ? [fact('flips by hand', 'were reset by Re-run')] : []),
     ...(comparison ? differences(comparison) : []),
   );
   facts.dataset['mode'] = report.mode;

@@ -6,7 +6,7 @@ import { boundsOf } from './bounds';
 import { compare } from './compare';
 import { Foreign, foreign } from './foreign';
 import { count, measure } from './format';
-import { METHODS, askedBy, hasSurfaces, orientOf, parseOptions } from './options';
+import { METHODS, askedBy, hasSurfaces, orientOf, parseOptions, type OptionsForm } from './options';
 import { colorsOf } from './ramp';
 import { UNTURNED, type NormalSource, type State, type Store, type Turned } from './state';
 import { guessUp } from './upright';
@@ -31,6 +31,8 @@ export interface Session {
   flipSurface(point: number): boolean;
   /** Takes back the last of these two that was not taken back. */
   undoFlip(): void;
+  /** Computes the result again whose flips by hand went with it, and flips it so. */
+  bringBack(): Promise<void>;
   save(): Promise<void>;
   cancel(): void;
 }
@@ -50,8 +52,22 @@ interface Shown {
   /** Settled when its points are on the screen. */
   drawn: Promise<void>;
   result?: { normals: Float32Array; curvature?: Float32Array; components?: Uint32Array };
-  /** What the result was computed with. */
+  /** What the result was computed with, and the controls then. */
   options?: EstimateOptions;
+  form?: Form;
+}
+
+type Form = OptionsForm & Pick<State, 'up'>;
+/** A surface, or undefined for all, and whether it brought back faces. */
+type Flip = { surface: number | undefined; broughtBacks: boolean };
+
+/** A result that was flipped by hand: the same options compute the same again. */
+interface Flipped {
+  file: File;
+  options: EstimateOptions;
+  form: Form;
+  turned: Turned;
+  flips: Flip[];
 }
 
 interface Step {
@@ -63,8 +79,11 @@ interface Step {
 export function createSession(store: Store, viewer: Viewer): Session {
   let current: AbortController | undefined;
   let shown: Shown | undefined;
-  /** What was flipped by hand, the last at the end: a surface, or undefined for all, and whether it brought back faces. */
-  let flips: { surface: number | undefined; broughtBacks: boolean }[] = [];
+  /** What was flipped by hand, the last at the end. */
+  let flips: Flip[] = [];
+  let areSaved = false;
+  /** What can be brought back. */
+  let gone: Flipped | undefined;
 
   /** Runs one job to its end; what it throws becomes the message on the page, unless it was cancelled. */
   async function run(trouble: string, work: (step: Step) => Promise<void>): Promise<void> {
@@ -74,7 +93,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
     const tell = (title: string, phase: string, fraction: number | undefined) => {
       if (current === mine) store.set({ job: { title, phase, fraction } });
     };
-    store.set({ error: undefined, note: undefined });
+    store.set({ error: undefined });
     try {
       await work({
         signal: mine.signal,
@@ -112,7 +131,10 @@ export function createSession(store: Store, viewer: Viewer): Session {
     const normals = cloud.normals?.some((value) => value !== 0) ? cloud.normals : undefined;
     // In a task of its own: by then the worker has begun with the normals.
     const drawn = new Promise((resolve) => setTimeout(resolve)).then(() => viewer.show(cloud, bounds, up));
+    const before = areSaved ? undefined : flippedNow();
+    const name = shown?.file.name;
     shown = { file, positions: cloud.positions, normals, drawn };
+    flips = [];
     const scan = {
       name: file.name,
       points: cloud.count,
@@ -140,20 +162,44 @@ export function createSession(store: Store, viewer: Viewer): Session {
       cellText: '',
       orientKind: isPast ? 'consistent' : orientKind,
     });
+    leave(before, `Your flips of ${name} were not saved.`);
+  }
+
+  /** What is shown, if it is flipped by hand. */
+  function flippedNow(): Flipped | undefined {
+    const { file, options, form } = shown ?? {};
+    const { flipped, turnedSurfaces } = store.state;
+    if (!file || !options || !form || (!flipped && turnedSurfaces.size === 0)) return undefined;
+    return { file, options, form, turned: { flipped, turnedSurfaces }, flips };
+  }
+
+  /** What is flipped by hand has just gone from the screen, or nothing has. */
+  function leave(before: Flipped | undefined, text: string): void {
+    gone = before;
+    store.set({ note: before && { text, isOfFlips: true } });
   }
 
   async function shade(step: Step): Promise<void> {
     const parsed = parseOptions(store.state);
     if ('problem' in parsed) throw new Error(parsed.problem);
-    const { orientKind, up, scan, flipped, turnedSurfaces } = store.state;
+    const { method, cellKind, cellText, kText, orientKind, up, scan } = store.state;
+    const form = { method, cellKind, cellText, kText, orientKind, up };
     const orient = orientOf(orientKind, up, viewer.eye(), scan?.scanner);
-    const turned = { ...UNTURNED, wereReset: flipped || turnedSurfaces.size > 0 };
-    await shadeBy({ ...parsed.options, orient }, askedBy(store.state, up), turned, step);
-    flips = [];
+    await compute({ ...parsed.options, orient }, form, UNTURNED, [], step);
   }
 
-  /** `asked` is what the form asked for, `turned` what a person turned by hand since it was computed last. */
-  async function shadeBy(options: EstimateOptions, asked: string, turned: Turned, step: Step): Promise<void> {
+  /** A result of its own, in place of one that may be flipped by hand. */
+  async function compute(options: EstimateOptions, form: Form, turned: Turned, itsFlips: Flip[], step: Step) {
+    const before = flippedNow();
+    await shadeBy(options, form, turned, step);
+    flips = itsFlips;
+    areSaved = false;
+    // A file that was just opened has none, and keeps what was told then.
+    if (before) leave(before, 'Re-run has undone your flips.');
+  }
+
+  /** `form` is what asked for it, `turned` what a person turned by hand since it was computed last. */
+  async function shadeBy(options: EstimateOptions, form: Form, turned: Turned, step: Step): Promise<void> {
     const { scan, shading } = store.state;
     if (!shown || !scan) return;
     const { method = 'bilinear', k = 0, orient = 'none' } = options;
@@ -171,10 +217,10 @@ export function createSession(store: Store, viewer: Viewer): Session {
     const { flipped, turnedSurfaces } = turned;
     if (flipped) negate(result.normals);
     for (const surface of turnedSurfaces) negate(result.normals, result.components, surface);
-    shown = { ...shown, result, options };
+    shown = { ...shown, result, options, form };
     viewer.setNormals(result.normals, result.curvature && colorsOf(result.curvature));
     const hasCurvature = result.curvature !== undefined;
-    const used = { method, k, orient, asked };
+    const used = { method, k, orient, asked: askedBy(form, form.up) };
     store.set({ scan: { ...scan, hasNormals: true, hasCurvature }, report, used, ...turned, ...compared(shown) });
   }
 
@@ -193,6 +239,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
     if (!shown?.result) return;
     const { normals, components } = shown.result;
     negate(normals, surface === undefined ? undefined : components, surface);
+    areSaved = false;
     viewer.refreshNormals(normals);
     const { flipped } = store.state;
     const turnedSurfaces = new Set(store.state.turnedSurfaces);
@@ -200,9 +247,25 @@ export function createSession(store: Store, viewer: Viewer): Session {
     store.set({
       flipped: flipped !== (surface === undefined),
       turnedSurfaces,
-      wereReset: false,
       backs,
       ...compared(shown),
+    });
+  }
+
+  async function bringBack(): Promise<void> {
+    const back = gone;
+    if (!back) return;
+    await run(back.file.name, async (step) => {
+      const { note } = store.state;
+      if (shown?.file !== back.file) await show(back.file, step);
+      // What is cancelled now can be tried again, unless the other file had flips, too.
+      if (!gone) {
+        gone = back;
+        store.set({ note });
+      }
+      store.set(back.form);
+      await compute(back.options, back.form, back.turned, back.flips, step);
+      if (gone === back) leave(undefined, '');
     });
   }
 
@@ -227,7 +290,9 @@ export function createSession(store: Store, viewer: Viewer): Session {
       }
       await run(file.name, async (step) => {
         await show(file, step);
-        if (scans.length > 1) store.set({ note: `One scan is shown at a time: the first of ${count(scans.length)}.` });
+        // Unless there is more to lose.
+        const { note = { text: `One scan is shown at a time: the first of ${count(scans.length)}.` } } = store.state;
+        if (scans.length > 1) store.set({ note });
         await shade(step);
       });
     },
@@ -242,12 +307,10 @@ export function createSession(store: Store, viewer: Viewer): Session {
     estimate: () => run('Computing normals', shade),
 
     async addCurvature() {
-      const { result, options } = shown ?? {};
-      const { flipped, turnedSurfaces, wereReset, used } = store.state;
-      if (!result || !options || !used || result.curvature) return;
-      await run('Computing curvature', (step) =>
-        shadeBy(options, used.asked, { flipped, turnedSurfaces, wereReset }, step),
-      );
+      const { result, options, form } = shown ?? {};
+      if (!result || !options || !form || result.curvature) return;
+      const { flipped, turnedSurfaces } = store.state;
+      await run('Computing curvature', (step) => shadeBy(options, form, { flipped, turnedSurfaces }, step));
     },
 
     showNormals(source) {
@@ -269,7 +332,10 @@ export function createSession(store: Store, viewer: Viewer): Session {
     undoFlip() {
       const last = flips.pop();
       if (last) turnRound(last.surface, store.state.backs && !last.broughtBacks);
+      else if (gone && gone.file === shown?.file) void bringBack();
     },
+
+    bringBack,
 
     save: () =>
       run('Saving', async (step) => {
@@ -281,6 +347,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
           { normals, ...(curvature && { curvature }) },
           { signal: step.signal, onProgress: step.begin('Saving') },
         );
+        areSaved = true;
         download(ply, `${file.name.replace(/\.[^.]*$/, '')}-normals.ply`);
       }),
 
