@@ -1098,6 +1098,33 @@ test('frames keep coming while the normals of a million points are computed', as
   assert.ok(frames >= 6, `${frames} frames in three runs`);
 });
 
+test('a large cloud is drawn by many frames, until it is whole', async () => {
+  page = await browser.openPage(browser.isolated, {
+    script: () => {
+      window.draws = [];
+      const { drawArrays } = WebGL2RenderingContext.prototype;
+      WebGL2RenderingContext.prototype.drawArrays = function (mode, first, count) {
+        window.draws.push({ first, end: first + count, covered: !document.querySelector('.cover').hidden });
+        drawArrays.call(this, mode, first, count);
+      };
+    },
+  });
+  const points = 2_500_000;
+  await choose(page, 'large.ply', spherePly(points));
+  await result(page, 'large.ply');
+  // A frame later it has begun.
+  await page.evaluate(() => {
+    document.querySelector('[data-do=flip]').click();
+    return new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+  });
+  await page.waitForFunction(() => document.querySelector('.cover').hidden);
+  const draws = await page.evaluate(() => window.draws);
+  const last = draws.slice(draws.findLastIndex(({ first }) => first === 0));
+  assert.ok(last.length > 1 && last.every(({ covered }) => covered), JSON.stringify(last));
+  for (const [i, { first, end }] of last.entries()) assert.equal(end, last[i + 1]?.first ?? points, `from ${first}`);
+  assert.ok((await backsShown(page)) > 0.9);
+});
+
 test('a browser without WebGL 2 is told so', async () => {
   page = await browser.openPage(browser.isolated, {
     script: () => {
