@@ -186,7 +186,7 @@ test('of several files the first scan is taken, and folders are refused', async 
   assert.ok(await page.locator('#note').isHidden());
   await drop(page, 'first.ply', spherePly(5_000), { before: ['notes.txt'], after: ['second.ply', 'third.ply'] });
   assert.equal((await result(page, 'first.ply')).error, undefined);
-  const note = page.locator('#note').getByText('One scan is shown at a time: the first of 3.');
+  const note = page.locator('#note').getByText('The first of 3 scans is shown.');
   assert.ok(await note.isVisible());
   await page.getByRole('button', { name: 'Dismiss the note' }).click();
   assert.ok(await note.isHidden());
@@ -812,7 +812,7 @@ test('flips that a new result or another file takes away can be brought back', a
 
   await oriented('As found', 'balls.ply');
   assert.ok(!(await isFlipped()));
-  assert.match(await note.innerText(), /^Re-run has undone your flips\./);
+  assert.match(await note.innerText(), /^Re-run undid your flips\./);
   // Computed again as it was, signs and all.
   await page.keyboard.press('Control+z');
   await page.waitForFunction(() => document.querySelector('[data-do=flip]').ariaPressed === 'true');

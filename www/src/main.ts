@@ -57,7 +57,9 @@ function start(viewer: Viewer): void {
     },
     cancel: () => session.cancel(),
     dismiss: () => store.set({ error: undefined }),
-    back: () => void session.bringBack(),
+    back: () => {
+      if (!store.state.job) void session.bringBack();
+    },
     read: () => store.set({ note: undefined }),
   };
   for (const button of document.querySelectorAll<HTMLButtonElement>('[data-do]')) {

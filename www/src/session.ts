@@ -195,7 +195,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
     flips = itsFlips;
     areSaved = false;
     // A file that was just opened has none, and keeps what was told then.
-    if (before) leave(before, 'Re-run has undone your flips.');
+    if (before) leave(before, 'Re-run undid your flips.');
   }
 
   /** `form` is what asked for it, `turned` what a person turned by hand since it was computed last. */
@@ -291,7 +291,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
       await run(file.name, async (step) => {
         await show(file, step);
         // Unless there is more to lose.
-        const { note = { text: `One scan is shown at a time: the first of ${count(scans.length)}.` } } = store.state;
+        const { note = { text: `The first of ${count(scans.length)} scans is shown.` } } = store.state;
         if (scans.length > 1) store.set({ note });
         await shade(step);
       });
