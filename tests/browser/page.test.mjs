@@ -541,6 +541,10 @@ test('a question mark opens the help, and Escape or a click closes it and nothin
     }
   }
   assert.ok(await page.locator('#hint').isVisible());
+  // In a low window it begins at its beginning.
+  await page.setViewportSize({ width: 720, height: 300 });
+  await page.keyboard.press('?');
+  assert.ok((await page.getByRole('heading', { name: 'How to move' }).boundingBox()).y > 0);
 });
 
 test('the view follows the window until it is moved', async () => {

@@ -43,11 +43,17 @@ function start(viewer: Viewer): void {
     canvas.focus();
   };
 
+  const openHelp = () => {
+    help.showModal();
+    // The button that gets the focus is at its end.
+    help.scrollTop = 0;
+  };
+
   const actions: Record<string, () => void> = {
     choose: () => input.click(),
     sample: () => void session.openSample(),
     fit: () => viewer.fit(),
-    help: () => help.showModal(),
+    help: openHelp,
     flip: () => session.flip(),
     turn: () => turnSurfaces(!store.state.turning),
     undo: () => session.undoFlip(),
@@ -88,7 +94,7 @@ function start(viewer: Viewer): void {
       if (key === 'z' && !event.shiftKey && !store.state.job) session.undoFlip();
       return;
     }
-    if (key === '?') help.showModal();
+    if (key === '?') openHelp();
     if (key === 'f') viewer.fit();
     // The box does nothing while it is disabled.
     if (key === 'b') element('#backs').click();
