@@ -1,6 +1,7 @@
 // What to tell a person whose file is no PLY: what it is, as far as its name or its beginning say, and what to do with it.
 
-const MESHES_AND_SCANS = 'Only PLY files can be opened; CloudCompare and MeshLab, among others, save scans as PLY.';
+const TOOLS = 'CloudCompare and MeshLab, among others, save scans as PLY.';
+const CONVERT = `Only PLY files can be opened; ${TOOLS}`;
 const UNPACK = 'Unpack it, then open the PLY file in it.';
 
 /** The first that fits counts: a name tells more than how the file is packed. */
@@ -16,11 +17,11 @@ const KINDS: { name?: RegExp; begins?: RegExp; is: string; remedy: string }[] = 
   { begins: /^(\xff\xfe|\xfe\xff|p\0l\0y\0)/, is: 'is text in UTF-16', remedy: 'Save it as ASCII or UTF-8.' },
   { begins: /^version https:\/\/git-lfs/, is: 'is a Git LFS pointer', remedy: 'Fetch the scan with git lfs pull.' },
   { begins: /^\s*<(!|html)/i, is: 'is a web page, not a scan', remedy: 'Download the file itself.' },
-  { begins: /^LASF/, is: 'is a LAS or LAZ file', remedy: MESHES_AND_SCANS },
-  { begins: /^# \.PCD/, is: 'is a PCD file', remedy: MESHES_AND_SCANS },
-  { begins: /^ASTM-E57/, is: 'is an E57 file', remedy: MESHES_AND_SCANS },
-  { begins: /^glTF/, is: 'is a glTF file', remedy: MESHES_AND_SCANS },
-  { begins: /^solid/, is: 'is an STL file', remedy: MESHES_AND_SCANS },
+  { begins: /^LASF/, is: 'is a LAS or LAZ file', remedy: CONVERT },
+  { begins: /^# \.PCD/, is: 'is a PCD file', remedy: CONVERT },
+  { begins: /^ASTM-E57/, is: 'is an E57 file', remedy: CONVERT },
+  { begins: /^glTF/, is: 'is a glTF file', remedy: CONVERT },
+  { begins: /^solid/, is: 'is an STL file', remedy: CONVERT },
 ];
 
 /** Why a file cannot be opened, as what follows its name. */
@@ -39,5 +40,5 @@ export async function foreign(file: File): Promise<Foreign | undefined> {
   if (/^(\xef\xbb\xbf)?ply/i.test(begin)) return undefined;
   if (begin === '') return new Foreign('is empty.');
   const kind = KINDS.find(({ name, begins }) => name?.test(file.name) || begins?.test(begin));
-  return new Foreign(kind ? `${kind.is}. ${kind.remedy}` : `is not a PLY file. ${MESHES_AND_SCANS}`);
+  return new Foreign(kind ? `${kind.is}. ${kind.remedy}` : `is not a PLY file, and only these can be opened. ${TOOLS}`);
 }
