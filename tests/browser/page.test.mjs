@@ -365,6 +365,12 @@ test('another method, after a k that cannot be one', async () => {
   assert.equal(await page.getByRole('textbox', { name: 'multiples of L' }).inputValue(), '1');
   await again.click();
   await page.waitForFunction(() => document.querySelector('#facts').textContent.includes('cubes'));
+
+  // In a low window it comes into sight.
+  await page.setViewportSize({ width: 1280, height: 420 });
+  await page.getByRole('textbox', { name: 'multiples of L' }).fill('none');
+  const [problem, save] = await Promise.all(['#problem', '.save'].map((part) => page.locator(part).boundingBox()));
+  assert.ok(problem.y + problem.height <= save.y, JSON.stringify({ problem, save }));
 });
 
 test('curvature is computed to be shown, for the normals that are there, and saved with them', async () => {

@@ -152,7 +152,11 @@ function showOptions(state: State, busy: boolean): void {
   }
   const note = element('#problem');
   note.hidden = problem === '';
-  note.textContent = problem;
+  if (note.textContent !== problem) {
+    note.textContent = problem;
+    // On a small screen it would be out of sight.
+    note.scrollIntoView({ block: 'nearest' });
+  }
   const again = element<HTMLButtonElement>('#again');
   again.disabled = problem !== '';
   rest(again, busy);
