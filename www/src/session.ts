@@ -393,7 +393,7 @@ function makeSample(signal: AbortSignal): Promise<File> {
   return new Promise<File>((resolve, reject) => {
     signal.addEventListener('abort', () => reject(signal.reason));
     worker.onmessage = ({ data }: MessageEvent<Uint8Array<ArrayBuffer>>) => resolve(new File([data], 'sample.ply'));
-    worker.onerror = () => reject(new Error('the worker that makes the sample did not start'));
+    worker.onerror = () => reject(new Error('the script that makes it did not load'));
     worker.postMessage({ points: SAMPLE_POINTS });
   }).finally(() => worker.terminate());
 }
