@@ -188,6 +188,7 @@ test('of several files the first scan is taken, and folders are refused', async 
   assert.equal((await result(page, 'first.ply')).error, undefined);
   const note = page.locator('#note').getByText('The first of 3 scans is shown.');
   assert.ok(await note.isVisible());
+  assert.equal(await page.locator('#told').textContent(), 'The first of 3 scans is shown.');
   await page.getByRole('button', { name: 'Dismiss the note' }).click();
   assert.ok(await note.isHidden());
   // Without a scan among them, what is there stays.

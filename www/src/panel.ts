@@ -109,8 +109,8 @@ function moveFocus({ scan, job }: State): void {
 /** For those who hear the page: what begins, what a flip has done, and what else there is to know. */
 function tell({ job, flipped, turnedSurfaces, note }: State, before: State | undefined): void {
   const told = element('#told');
-  if (note && before?.note !== note) told.textContent = note.text;
-  else if (before?.job?.title !== job?.title) told.textContent = job?.title ?? '';
+  // A note comes with a job, and is told when that no longer speaks.
+  if (before?.job?.title !== job?.title) told.textContent = job?.title ?? note?.text ?? '';
   else if (!before || job) return;
   else if (before.flipped !== flipped) told.textContent = flipped ? 'All flipped' : 'All flipped back';
   else if (before.turnedSurfaces !== turnedSurfaces) {
