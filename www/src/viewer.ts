@@ -182,6 +182,9 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     if (filled > 0 && elapsed > SLOW_FILL) filling = Math.max(FILL_LEAST, filling / 2);
     else if (filled > 0 && elapsed < FAST_FILL) filling = Math.min(FILL_MOST, filling * 2);
     if (isLarge && filled === 0) {
+      settle();
+      // Or it would begin again, for less than can be seen.
+      lastMove = -Infinity;
       drawPart(Math.min(affordable, filling));
       cover.width = canvas.width;
       cover.height = canvas.height;
@@ -268,14 +271,19 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     turned.rotation.z = up === 'x' ? right : up === '-x' ? -right : 0;
   }
 
+  /** Spends what is left of a movement, as an update without damping does. */
+  function settle(): void {
+    controls.enableDamping = false;
+    controls.update();
+    controls.enableDamping = !calm;
+  }
+
   function fit(): void {
     if (!bounds) return;
     // A window without a size is framed when it gets one.
     framed = true;
     if (canvas.clientWidth === 0 || canvas.clientHeight === 0) return;
-    // Without damping an update spends what is left of a movement.
-    controls.enableDamping = false;
-    controls.update();
+    settle();
     const [x, y, z] = bounds.extent;
     const box = new Vector3(x, y, z).applyEuler(turned.rotation);
     const flat = 1 - Math.min(1, Math.abs(box.y) / Math.max(Math.abs(box.x), Math.abs(box.z), Number.MIN_VALUE));
@@ -291,7 +299,6 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     controls.minDistance = 1e-3;
     controls.maxDistance = Math.max(reach, distance) * 20;
     controls.update();
-    controls.enableDamping = !calm;
     // A jump, not a movement: draw all of it at once.
     lastMove = -Infinity;
     // The updates above told of a change.
