@@ -633,8 +633,8 @@ test('normals that the file had are compared with the computed ones, and shown i
   for (let at = start; at < bytes.length; at += 24) {
     [0, 0, at > start ? 2 : NaN].forEach((value, axis) => bytes.writeFloatLE(value, at + 12 + 4 * axis));
   }
-  await drop(page, 'again.ply', bytes);
-  await result(page, 'again.ply');
+  await drop(page, 'ball-normals.ply', bytes);
+  await result(page, 'ball-normals.ply');
   assert.match(await facts(), /57(\.\d)?° from the file's normals\s+(49|50|51)(\.\d)?% of these opposite/);
 
   await page.getByRole('radio', { name: 'Normals', exact: true }).check();
@@ -646,6 +646,7 @@ test('normals that the file had are compared with the computed ones, and shown i
   await page.getByRole('button', { name: 'Flip all' }).click();
   assert.ok(await page.getByRole('radio', { name: 'Computed' }).isChecked());
   assert.ok((await colorsShown(page)) > computed / 2);
+  assert.equal((await save(page)).name, 'ball-normals.ply');
 });
 
 test('a file without a finite point is refused', async () => {

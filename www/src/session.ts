@@ -348,7 +348,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
           { signal: step.signal, onProgress: step.begin('Saving') },
         );
         areSaved = true;
-        download(ply, `${file.name.replace(/\.[^.]*$/, '')}-normals.ply`);
+        download(ply, `${file.name.replace(/(-normals)?\.[^.]*$/, '')}-normals.ply`);
       }),
 
     cancel() {
