@@ -1,6 +1,7 @@
 // What takes the pictures: the page's own viewer, and nothing else on the screen. Runs in a browser (pictures.mjs).
 
-import { boundsOf, guessUp } from '../../www/src/bounds.ts';
+import { boundsOf } from '../../www/src/bounds.ts';
+import { guessUp } from '../../www/src/upright.ts';
 import { createViewer } from '../../www/src/viewer.ts';
 
 const viewer = createViewer(document.querySelector('canvas'));
@@ -15,7 +16,7 @@ async function numbers(file) {
 window.showCloud = async ({ positions, normals, origin, up, shading, pointSize }) => {
   const cloud = { positions: await numbers(positions) };
   const bounds = boundsOf(cloud.positions);
-  viewer.show(cloud, bounds, up ?? guessUp(bounds, origin));
+  viewer.show(cloud, bounds, up ?? guessUp(cloud.positions, bounds, origin));
   viewer.setNormals(await numbers(normals));
   viewer.setShading(shading);
   viewer.setPointSize(pointSize);

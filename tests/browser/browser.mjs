@@ -88,17 +88,17 @@ export function spherePly(points, { colored = false, centres = [[0, 0, 0]], radi
   return file;
 }
 
-/** Drops a file onto the middle of the window, after empty ones that are named `before`. */
-export async function drop(page, name, bytes, before = []) {
+/** Drops a file onto the middle of the window, after empty ones that are named `before`, before its likes `after`. */
+export async function drop(page, name, bytes, { before = [], after = [] } = {}) {
   const transfer = await page.evaluateHandle(
-    ([name, text, before]) => {
+    ([names, text, before]) => {
       const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
       const transfer = new DataTransfer();
       for (const name of before) transfer.items.add(new File([], name));
-      transfer.items.add(new File([bytes], name));
+      for (const name of names) transfer.items.add(new File([bytes], name));
       return transfer;
     },
-    [name, Buffer.from(bytes).toString('base64'), before],
+    [[name, ...after], Buffer.from(bytes).toString('base64'), before],
   );
   await page.dispatchEvent('body', 'drop', { dataTransfer: transfer });
 }

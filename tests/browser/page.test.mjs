@@ -169,7 +169,7 @@ test('what is no scan stops no work', async () => {
   await page.getByRole('button', { name: 'Re-run' }).click();
   await page.locator('#job').waitFor();
   await drop(page, 'notes.txt', Buffer.from('Milk, bread'));
-  await page.getByText('Only PLY files can be opened; notes.txt is none').waitFor();
+  await page.getByText(/^notes\.txt is not a PLY file, .* The work goes on\.$/).waitFor();
   assert.ok(await page.locator('#job').isVisible());
   assert.equal(await page.locator('#name').textContent(), 'ball.ply');
   // A scan does, also where it begins with a byte order mark and with capitals.
@@ -180,20 +180,31 @@ test('what is no scan stops no work', async () => {
 
 test('of several files the first scan is taken, and folders are refused', async () => {
   page = await browser.openPage(browser.isolated);
-  await drop(page, 'ball.PLY', spherePly(5_000), ['photo.jpg']);
-  await page.waitForFunction(() => document.querySelector('#facts').childElementCount > 0);
-  assert.match((await result(page, 'ball.PLY')).error, /One file at a time .* ball\.PLY/);
+  // Those before it are empty, whatever their names: nothing to be told of.
+  await drop(page, 'ball.PLY', spherePly(5_000), { before: ['photo.jpg', 'empty.ply'] });
+  assert.equal((await result(page, 'ball.PLY')).error, undefined);
+  assert.ok(await page.locator('#note').isHidden());
+  await drop(page, 'first.ply', spherePly(5_000), { before: ['notes.txt'], after: ['second.ply', 'third.ply'] });
+  assert.equal((await result(page, 'first.ply')).error, undefined);
+  const note = page.locator('#note').getByText('The first of 3 scans is shown.');
+  assert.ok(await note.isVisible());
+  assert.equal(await page.locator('#told').textContent(), 'The first of 3 scans is shown.');
+  await page.getByRole('button', { name: 'Dismiss the note' }).click();
+  assert.ok(await note.isHidden());
+  // Without a scan among them, what is there stays.
+  await drop(page, 'notes.txt', Buffer.alloc(0), { after: ['photo.jpg'] });
+  assert.match((await result(page, 'first.ply')).error, /^notes\.txt is empty/);
   // As a browser tells a folder, which cannot be made in a test.
   await page.evaluate(() => (DataTransferItem.prototype.webkitGetAsEntry = () => ({ isDirectory: true })));
   await drop(page, 'scans', Buffer.alloc(0));
-  assert.match((await result(page, 'ball.PLY')).error, /^Folders are not taken/);
+  assert.match((await result(page, 'first.ply')).error, /^Folders are not taken/);
 });
 
 test('a file that is too large for one buffer says so, and one that is no scan says that', async () => {
   page = await browser.openPage(browser.isolated);
   for (const [name, begin, message] of [
     ['city.ply', 'ply\nformat ascii 1.0\n', 'city.ply: the file has 2.25 GiB, and up to 2 can be opened; '],
-    ['city.las', 'LASF', 'Only PLY files can be opened; city.las is not a PLY file. '],
+    ['city.las', 'LASF', 'city.las is a LAS or LAZ file. Only PLY'],
   ]) {
     // One without its bytes: nothing may ask for more than the first of them.
     await page.evaluate(
@@ -234,15 +245,15 @@ test('a bad file gives a message that can be read, and the cloud before stays', 
   await drop(page, 'photo.ply', Buffer.from('GIF89a, not a scan'));
   const alert = page.getByRole('alert').filter({ hasText: 'photo.ply' });
   await alert.waitFor();
-  assert.match(
-    await alert.textContent(),
-    /^Only PLY files can be opened; photo\.ply is not .*GIF89a.*'\. CloudCompare/,
-  );
+  assert.match(await alert.textContent(), /^photo\.ply is not a PLY file, .* CloudCompare/);
   assert.ok(await page.locator('#start').isVisible());
-  // What to do is told once: by the page, or with what the file is.
+  // What to do depends on what it is, not on the words of the reader.
   for (const [name, bytes, remedy] of [
-    ['flight.las', 'LASF\0\0\0\0', /a LAS or LAZ file\. CloudCompare .* save scans as PLY\.$/],
-    ['ball.ply.gz', '\x1f\x8b\x08', /a gzip file; unpack it first$/],
+    ['flight.las', 'LASF\0\0\0\0', /is a LAS or LAZ file\. .*CloudCompare .* save scans as PLY\.$/],
+    ['ball.ply.gz', '\x1f\x8b\x08', /is packed with gzip\. Unpack it, /],
+    ['castle.spz', '\x1f\x8b\x08', /holds Gaussian splats\. .*SuperSplat.* saves splats as PLY\.$/],
+    ['utf16.ply', '\xff\xfep\0l\0y\0', /is text in UTF-16\. Save it as ASCII or UTF-8\.$/],
+    ['nothing.ply', '', /is empty\.$/],
   ]) {
     await drop(page, name, Buffer.from(bytes, 'latin1'));
     await page.getByRole('alert').filter({ hasText: name }).waitFor();
@@ -355,6 +366,12 @@ test('another method, after a k that cannot be one', async () => {
   assert.equal(await page.getByRole('textbox', { name: 'multiples of L' }).inputValue(), '1');
   await again.click();
   await page.waitForFunction(() => document.querySelector('#facts').textContent.includes('cubes'));
+
+  // In a low window it comes into sight.
+  await page.setViewportSize({ width: 1280, height: 420 });
+  await page.getByRole('textbox', { name: 'multiples of L' }).fill('none');
+  const [problem, save] = await Promise.all(['#problem', '.save'].map((part) => page.locator(part).boundingBox()));
+  assert.ok(problem.y + problem.height <= save.y, JSON.stringify({ problem, save }));
 });
 
 test('curvature is computed to be shown, for the normals that are there, and saved with them', async () => {
@@ -531,6 +548,10 @@ test('a question mark opens the help, and Escape or a click closes it and nothin
     }
   }
   assert.ok(await page.locator('#hint').isVisible());
+  // In a low window it begins at its beginning.
+  await page.setViewportSize({ width: 720, height: 300 });
+  await page.keyboard.press('?');
+  assert.ok((await page.getByRole('heading', { name: 'How to move' }).boundingBox()).y > 0);
 });
 
 test('the view follows the window until it is moved', async () => {
@@ -612,8 +633,8 @@ test('normals that the file had are compared with the computed ones, and shown i
   for (let at = start; at < bytes.length; at += 24) {
     [0, 0, at > start ? 2 : NaN].forEach((value, axis) => bytes.writeFloatLE(value, at + 12 + 4 * axis));
   }
-  await drop(page, 'again.ply', bytes);
-  await result(page, 'again.ply');
+  await drop(page, 'ball-normals.ply', bytes);
+  await result(page, 'ball-normals.ply');
   assert.match(await facts(), /57(\.\d)?° from the file's normals\s+(49|50|51)(\.\d)?% of these opposite/);
 
   await page.getByRole('radio', { name: 'Normals', exact: true }).check();
@@ -625,6 +646,7 @@ test('normals that the file had are compared with the computed ones, and shown i
   await page.getByRole('button', { name: 'Flip all' }).click();
   assert.ok(await page.getByRole('radio', { name: 'Computed' }).isChecked());
   assert.ok((await colorsShown(page)) > computed / 2);
+  assert.equal((await save(page)).name, 'ball-normals.ply');
 });
 
 test('a file without a finite point is refused', async () => {
@@ -779,14 +801,57 @@ test('a flip turns what is saved, again undoes it, and curvature keeps it', asyn
   for (let presses = 1; presses <= 4; presses++) await page.keyboard.press('Control+z');
   assert.equal(await flip.getAttribute('aria-pressed'), 'false');
   assert.ok(!(await backs.isChecked()), 'the flip had switched it on');
+});
 
-  // What is computed anew is as its orientation promises, and says so.
-  assert.doesNotMatch(await page.locator('#facts').innerText(), /were reset/);
+test('flips that a new result or another file takes away can be brought back', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(
+    page,
+    'balls.ply',
+    spherePly(20_000, {
+      centres: [
+        [-1.5, 0, 0],
+        [1.5, 0, 0],
+      ],
+    }),
+  );
+  await result(page, 'balls.ply');
+  const flip = page.getByRole('button', { name: 'Flip all' });
+  const note = page.locator('#note');
+  const isFlipped = async () => (await flip.getAttribute('aria-pressed')) === 'true';
   await flip.click();
-  const { saved: anew, facts } = await oriented('Outward');
-  assert.deepEqual(anew, before);
-  assert.match(facts, /flips by hand were reset/);
-  assert.equal(await flip.getAttribute('aria-pressed'), 'false');
+  const turned = readSaved((await save(page)).bytes);
+
+  await oriented('As found', 'balls.ply');
+  assert.ok(!(await isFlipped()));
+  assert.match(await note.innerText(), /^Re-run undid your flips\./);
+  // Computed again as it was, signs and all.
+  await page.keyboard.press('Control+z');
+  await page.waitForFunction(() => document.querySelector('[data-do=flip]').ariaPressed === 'true');
+  await result(page, 'balls.ply');
+  assert.ok(await note.isHidden());
+  assert.ok(await orientation('Consistent').isChecked());
+  assert.deepEqual(readSaved((await save(page)).bytes), turned);
+
+  // What is saved is not lost.
+  await drop(page, 'other.ply', spherePly(5_000));
+  await result(page, 'other.ply');
+  assert.ok(await note.isHidden());
+  await flip.click();
+  await drop(page, 'balls.ply', spherePly(5_000));
+  await result(page, 'balls.ply');
+  assert.match(await note.innerText(), /^Your flips of other\.ply were not saved\./);
+  assert.ok(!(await isFlipped()));
+  await note.getByRole('button', { name: 'Bring back' }).click();
+  await result(page, 'other.ply');
+  assert.ok(await isFlipped());
+  assert.ok(await note.isHidden());
+  // And can be undone as before.
+  await page.keyboard.press('Control+z');
+  assert.ok(!(await isFlipped()));
+  await drop(page, 'balls.ply', spherePly(5_000));
+  await result(page, 'balls.ply');
+  assert.ok(await note.isHidden());
 });
 
 test('one surface is turned by a click, or by Enter in the middle of the view', async () => {
@@ -1045,6 +1110,33 @@ test('frames keep coming while the normals of a million points are computed', as
   assert.ok(frames >= 6, `${frames} frames in three runs`);
 });
 
+test('a large cloud is drawn by many frames, until it is whole', async () => {
+  page = await browser.openPage(browser.isolated, {
+    script: () => {
+      window.draws = [];
+      const { drawArrays } = WebGL2RenderingContext.prototype;
+      WebGL2RenderingContext.prototype.drawArrays = function (mode, first, count) {
+        window.draws.push({ first, end: first + count, covered: !document.querySelector('.cover').hidden });
+        drawArrays.call(this, mode, first, count);
+      };
+    },
+  });
+  const points = 2_500_000;
+  await choose(page, 'large.ply', spherePly(points));
+  await result(page, 'large.ply');
+  // A frame later it has begun.
+  await page.evaluate(() => {
+    document.querySelector('[data-do=flip]').click();
+    return new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
+  });
+  await page.waitForFunction(() => document.querySelector('.cover').hidden);
+  const draws = await page.evaluate(() => window.draws);
+  const last = draws.slice(draws.findLastIndex(({ first }) => first === 0));
+  assert.ok(last.length > 1 && last.every(({ covered }) => covered), JSON.stringify(last));
+  for (const [i, { first, end }] of last.entries()) assert.equal(end, last[i + 1]?.first ?? points, `from ${first}`);
+  assert.ok((await backsShown(page)) > 0.9);
+});
+
 test('a browser without WebGL 2 is told so', async () => {
   page = await browser.openPage(browser.isolated, {
     script: () => {
@@ -1141,7 +1233,39 @@ test('what a depth camera saw stands upright', async () => {
   }
 });
 
-const AERIAL = join(data, 'scans', 'las_ahn3_cropped.ply.gz');
+test('what stands along z stands upright', async () => {
+  page = await browser.openPage(browser.isolated);
+  // A table: its legs make it taller than what is flat, and it would fall over on its side.
+  const table = [-2, 2].flatMap((x) => [-3, 3].map((y) => [x, y, 0])).concat([-1, 1].map((y) => [0, y, 4]));
+  for (const [name, centres, up] of [
+    ['z.ply', table, 'z'],
+    ['y.ply', table.map(([x, y, z]) => [y, z, x]), 'y'],
+  ]) {
+    await drop(page, name, spherePly(6_000, { centres }));
+    await result(page, name);
+    assert.equal(await upAxis().inputValue(), up, name);
+  }
+});
+
+const SCANS = join(data, 'scans');
+test('real scans stand upright', { skip: !existsSync(SCANS) && `no ${SCANS}` }, async () => {
+  page = await browser.openPage(browser.isolated);
+  for (const [name, up] of [
+    ['cgal_building.ply', 'z'],
+    ['probreg_horse.ply', 'z'],
+    ['potree_lion_takanawa_normals_be.ply.gz', 'z'],
+    ['stanford_bun000_raw.ply', 'y'],
+    ['igea.ply', 'y'],
+    ['cilantro_frame_1.ply', '-y'],
+  ]) {
+    const bytes = readFileSync(join(SCANS, name));
+    await choose(page, name, name.endsWith('.gz') ? gunzipSync(bytes) : bytes);
+    await result(page, name);
+    assert.equal(await upAxis().inputValue(), up, name);
+  }
+});
+
+const AERIAL = join(SCANS, 'las_ahn3_cropped.ply.gz');
 test('a real aerial scan of 849 thousand points', { skip: !existsSync(AERIAL) && `no ${AERIAL}` }, async () => {
   page = await browser.openPage(browser.isolated);
   await choose(page, 'aerial.ply', gunzipSync(readFileSync(AERIAL)));

@@ -1,6 +1,4 @@
-// How far a cloud reaches and which way is up, without being fooled by stray or non-finite points.
-
-import type { Up } from './viewer';
+// How far a cloud reaches, without being fooled by stray or non-finite points.
 
 export interface Bounds {
   /** Middle of the bulk of the points. */
@@ -59,27 +57,4 @@ export function boundsOf(positions: Float32Array): Bounds | undefined {
   // Without strays the whole cloud is framed; a lone far point is not allowed to shrink the rest to a dot.
   const radius = (reach < 1.5 * most ? reach : most) || reach;
   return { centre, radius, reach, extent };
-}
-
-/**
- * Which axis points up. Surveys and rooms are z-up and flat along z, often with an origin far away; what a depth camera saw
- * lies before it, along z, and its y points down, or up where it looks against z; single things (meshes, range scans,
- * statues) are mostly y-up. The scanner's place is told by some files.
- */
-export function guessUp(
-  { centre, extent: [x, y, z] }: Bounds,
-  origin: readonly number[],
-  scanner: readonly [number, number, number] | undefined,
-): Up {
-  const surveyed = origin.some((value) => value !== 0);
-  if (scanner && !surveyed) {
-    const [aside, above, away] = scanner.map((value, axis) => value - centre[axis]!) as [number, number, number];
-    // From so far that it saw no more than a camera does, and along z: that the cloud is flat then is no sign of ground.
-    if (Math.abs(away) > Math.max(x, y, 2 * Math.hypot(aside, above))) return away > 0 ? 'y' : '-y';
-  }
-  if (surveyed || z < 0.6 * Math.min(x, y)) return 'z';
-  // Nothing behind or close to the camera, all within a right angle, and its axis passes through it.
-  const [right, down, ahead] = centre;
-  const isAhead = ahead > 0.75 * z && ahead > Math.max(x, y) / 2;
-  return isAhead && Math.abs(right) < x / 2 && Math.abs(down) < y / 2 ? '-y' : 'y';
 }

@@ -43,11 +43,17 @@ function start(viewer: Viewer): void {
     canvas.focus();
   };
 
+  const openHelp = () => {
+    help.showModal();
+    // The button that gets the focus is at its end.
+    help.scrollTop = 0;
+  };
+
   const actions: Record<string, () => void> = {
     choose: () => input.click(),
     sample: () => void session.openSample(),
     fit: () => viewer.fit(),
-    help: () => help.showModal(),
+    help: openHelp,
     flip: () => session.flip(),
     turn: () => turnSurfaces(!store.state.turning),
     undo: () => session.undoFlip(),
@@ -57,13 +63,16 @@ function start(viewer: Viewer): void {
     },
     cancel: () => session.cancel(),
     dismiss: () => store.set({ error: undefined }),
+    back: () => {
+      if (!store.state.job) void session.bringBack();
+    },
+    read: () => store.set({ note: undefined }),
   };
   for (const button of document.querySelectorAll<HTMLButtonElement>('[data-do]')) {
     button.addEventListener('click', actions[button.dataset['do']!]!);
   }
   input.addEventListener('change', () => {
-    const file = input.files?.[0];
-    if (file) void session.open(file);
+    void session.open([...(input.files ?? [])]);
     // The same file chosen again is a change again.
     input.value = '';
   });
@@ -85,7 +94,7 @@ function start(viewer: Viewer): void {
       if (key === 'z' && !event.shiftKey && !store.state.job) session.undoFlip();
       return;
     }
-    if (key === '?') help.showModal();
+    if (key === '?') openHelp();
     if (key === 'f') viewer.fit();
     // The box does nothing while it is disabled.
     if (key === 'b') element('#backs').click();
@@ -159,12 +168,9 @@ function takeDrops(session: Session): void {
     target.classList.remove('dropping');
     const items = [...(event.dataTransfer?.items ?? [])].filter(({ kind }) => kind === 'file');
     const files = items.filter((item) => !item.webkitGetAsEntry()?.isDirectory).map((item) => item.getAsFile()!);
-    const file = files.find(({ name }) => /\.ply$/i.test(name)) ?? files[0];
-    if (file) void session.open(file);
-    if (items.length === 0)
-      store.set({ error: 'That was not a file: drop a .ply file from a folder of this machine.' });
-    else if (!file) store.set({ error: 'Folders are not taken: drop a .ply file from it.' });
-    else if (items.length > 1) store.set({ error: `One file at a time is shown: ${file.name} was taken.` });
+    if (files.length > 0) void session.open(files);
+    else if (items.length > 0) store.set({ error: 'Folders are not taken: drop a .ply file from it.' });
+    else store.set({ error: 'That was not a file: drop a .ply file from a folder of this machine.' });
   });
 }
 

@@ -87,6 +87,7 @@ export function showState(store: Store): void {
 
     showOptions(state, busy);
     showError(start.hidden ? error : undefined);
+    showNote(state.note, busy);
     showJob(state);
     const same =
       before?.scan === scan &&
@@ -105,10 +106,11 @@ function moveFocus({ scan, job }: State): void {
   element(next).focus();
 }
 
-/** For those who hear the page: what begins, and what a flip has done. */
-function tell({ job, flipped, turnedSurfaces }: State, before: State | undefined): void {
+/** For those who hear the page: what begins, what a flip has done, and what else there is to know. */
+function tell({ job, flipped, turnedSurfaces, note }: State, before: State | undefined): void {
   const told = element('#told');
-  if (before?.job?.title !== job?.title) told.textContent = job?.title ?? '';
+  // A note comes with a job, and is told when that no longer speaks.
+  if (before?.job?.title !== job?.title) told.textContent = job?.title ?? note?.text ?? '';
   else if (!before || job) return;
   else if (before.flipped !== flipped) told.textContent = flipped ? 'All flipped' : 'All flipped back';
   else if (before.turnedSurfaces !== turnedSurfaces) {
@@ -117,7 +119,7 @@ function tell({ job, flipped, turnedSurfaces }: State, before: State | undefined
 }
 
 /** What starts a job does nothing while one runs, but keeps the focus of the keyboard. */
-const rest = (button: HTMLButtonElement, busy: boolean) => button.setAttribute('aria-disabled', String(busy));
+const rest = (button: HTMLElement, busy: boolean) => button.setAttribute('aria-disabled', String(busy));
 
 const radio = (name: string, value: string) => element<HTMLInputElement>(`input[name="${name}"][value="${value}"]`);
 
@@ -150,7 +152,11 @@ function showOptions(state: State, busy: boolean): void {
   }
   const note = element('#problem');
   note.hidden = problem === '';
-  note.textContent = problem;
+  if (note.textContent !== problem) {
+    note.textContent = problem;
+    // On a small screen it would be out of sight.
+    note.scrollIntoView({ block: 'nearest' });
+  }
   const again = element<HTMLButtonElement>('#again');
   again.disabled = problem !== '';
   rest(again, busy);
@@ -168,6 +174,14 @@ function showError(error: string | undefined): void {
   const box = element('#error');
   box.hidden = error === undefined;
   element('#error p').textContent = error ?? '';
+}
+
+function showNote(note: State['note'], busy: boolean): void {
+  element('#note').hidden = note === undefined;
+  write('#note p', note?.text ?? '');
+  const back = element('#note [data-do=back]');
+  back.hidden = !note?.isOfFlips;
+  rest(back, busy);
 }
 
 function showJob({ job }: State): void {
@@ -295,7 +309,6 @@ function showResult(state: State): void {
     ...signsOf(report, state),
     fact(count(report.unresolved), 'without a normal'),
     counted(report.threads, 'thread'),
-    ...(state.wereReset ? [fact('flips by hand', 'were reset by Re-run')] : []),
     ...(comparison ? differences(comparison) : []),
   );
   facts.dataset['mode'] = report.mode;

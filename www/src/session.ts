@@ -1,20 +1,23 @@
 // What a person can have done, as one flow: file -> readPointCloud -> estimateNormals, meanwhile viewer.show ->
 // viewer.setNormals -> report. One job runs at a time; a new one cancels it. Curvature is computed while it is shown.
-import { estimateNormals, readPointCloud, writePly, type EstimateOptions } from 'bilinormal';
+import { estimateNormals, readPointCloud, writePly, type EstimateOptions, type PointCloud } from 'bilinormal';
 import { scannerOf } from '../../src/js/scanner';
-import { boundsOf, guessUp } from './bounds';
+import { boundsOf } from './bounds';
 import { compare } from './compare';
-import { measure } from './format';
-import { METHODS, askedBy, hasSurfaces, orientOf, parseOptions } from './options';
+import { Foreign, foreign } from './foreign';
+import { count, measure } from './format';
+import { METHODS, askedBy, hasSurfaces, orientOf, parseOptions, type OptionsForm } from './options';
 import { colorsOf } from './ramp';
 import { UNTURNED, type NormalSource, type State, type Store, type Turned } from './state';
+import { guessUp } from './upright';
 import type { Viewer } from './viewer';
 import { warmingCloud } from './warming';
 
 export interface Session {
   /** Starts the workers and lets the browser compile them for speed, so that the first file need not wait for that. */
   warm(): void;
-  open(file: File): Promise<void>;
+  /** The first scan of these files. */
+  open(files: File[]): Promise<void>;
   openSample(): Promise<void>;
   /** Computes the normals of the cloud on the screen again, with the options that are set now. */
   estimate(): Promise<void>;
@@ -28,13 +31,13 @@ export interface Session {
   flipSurface(point: number): boolean;
   /** Takes back the last of these two that was not taken back. */
   undoFlip(): void;
+  /** Computes the result again whose flips by hand went with it, and flips it so. */
+  bringBack(): Promise<void>;
   save(): Promise<void>;
   cancel(): void;
 }
 
 const SAMPLE_POINTS = 500_000;
-const ONLY_PLY = 'Only PLY files can be opened';
-const REMEDY = 'CloudCompare and MeshLab, among others, save scans as PLY.';
 /** No larger file goes into one buffer of wasm. */
 const FILE_MOST = 2 ** 31 - 1;
 /** The surface of a point without a normal. */
@@ -49,8 +52,22 @@ interface Shown {
   /** Settled when its points are on the screen. */
   drawn: Promise<void>;
   result?: { normals: Float32Array; curvature?: Float32Array; components?: Uint32Array };
-  /** What the result was computed with. */
+  /** What the result was computed with, and the controls then. */
   options?: EstimateOptions;
+  form?: Form;
+}
+
+type Form = OptionsForm & Pick<State, 'up'>;
+/** A surface, or undefined for all, and whether it brought back faces. */
+type Flip = { surface: number | undefined; broughtBacks: boolean };
+
+/** A result that was flipped by hand: the same options compute the same again. */
+interface Flipped {
+  file: File;
+  options: EstimateOptions;
+  form: Form;
+  turned: Turned;
+  flips: Flip[];
 }
 
 interface Step {
@@ -62,8 +79,11 @@ interface Step {
 export function createSession(store: Store, viewer: Viewer): Session {
   let current: AbortController | undefined;
   let shown: Shown | undefined;
-  /** What was flipped by hand, the last at the end: a surface, or undefined for all, and whether it brought back faces. */
-  let flips: { surface: number | undefined; broughtBacks: boolean }[] = [];
+  /** What was flipped by hand, the last at the end. */
+  let flips: Flip[] = [];
+  let areSaved = false;
+  /** What can be brought back. */
+  let gone: Flipped | undefined;
 
   /** Runs one job to its end; what it throws becomes the message on the page, unless it was cancelled. */
   async function run(trouble: string, work: (step: Step) => Promise<void>): Promise<void> {
@@ -97,23 +117,24 @@ export function createSession(store: Store, viewer: Viewer): Session {
 
   async function show(file: File, step: Step): Promise<void> {
     const started = performance.now();
-    // Refused there too, as data without memory for it, whatever they are.
-    if (file.size > FILE_MOST) throw new Error((await beginsAsPly(file)) ? tooLarge(file) : 'not a PLY file');
-    const cloud = await readPointCloud(file, { signal: step.signal, onProgress: step.begin(`Reading ${file.name}`) });
+    const cloud = await read(file, step);
     step.signal.throwIfAborted();
     if (cloud.count === 0) throw new Error('the file holds no points');
     const readMilliseconds = performance.now() - started;
     const bounds = boundsOf(cloud.positions);
     if (!bounds) throw new Error('no point of the file has finite coordinates');
     const scanner = scannerOf(cloud);
-    const up = guessUp(bounds, cloud.origin, scanner);
+    const up = guessUp(cloud.positions, bounds, cloud.origin, scanner);
     const hasColors = cloud.colors !== undefined;
     const shading = store.state.shading === 'colors' && !hasColors ? 'shaded' : store.state.shading;
     // Gaussian splats bring zeros.
     const normals = cloud.normals?.some((value) => value !== 0) ? cloud.normals : undefined;
     // In a task of its own: by then the worker has begun with the normals.
     const drawn = new Promise((resolve) => setTimeout(resolve)).then(() => viewer.show(cloud, bounds, up));
+    const before = areSaved ? undefined : flippedNow();
+    const name = shown?.file.name;
     shown = { file, positions: cloud.positions, normals, drawn };
+    flips = [];
     const scan = {
       name: file.name,
       points: cloud.count,
@@ -141,20 +162,44 @@ export function createSession(store: Store, viewer: Viewer): Session {
       cellText: '',
       orientKind: isPast ? 'consistent' : orientKind,
     });
+    leave(before, `Your flips of ${name} were not saved.`);
+  }
+
+  /** What is shown, if it is flipped by hand. */
+  function flippedNow(): Flipped | undefined {
+    const { file, options, form } = shown ?? {};
+    const { flipped, turnedSurfaces } = store.state;
+    if (!file || !options || !form || (!flipped && turnedSurfaces.size === 0)) return undefined;
+    return { file, options, form, turned: { flipped, turnedSurfaces }, flips };
+  }
+
+  /** What is flipped by hand has just gone from the screen, or nothing has. */
+  function leave(before: Flipped | undefined, text: string): void {
+    gone = before;
+    store.set({ note: before && { text, isOfFlips: true } });
   }
 
   async function shade(step: Step): Promise<void> {
     const parsed = parseOptions(store.state);
     if ('problem' in parsed) throw new Error(parsed.problem);
-    const { orientKind, up, scan, flipped, turnedSurfaces } = store.state;
+    const { method, cellKind, cellText, kText, orientKind, up, scan } = store.state;
+    const form = { method, cellKind, cellText, kText, orientKind, up };
     const orient = orientOf(orientKind, up, viewer.eye(), scan?.scanner);
-    const turned = { ...UNTURNED, wereReset: flipped || turnedSurfaces.size > 0 };
-    await shadeBy({ ...parsed.options, orient }, askedBy(store.state, up), turned, step);
-    flips = [];
+    await compute({ ...parsed.options, orient }, form, UNTURNED, [], step);
   }
 
-  /** `asked` is what the form asked for, `turned` what a person turned by hand since it was computed last. */
-  async function shadeBy(options: EstimateOptions, asked: string, turned: Turned, step: Step): Promise<void> {
+  /** A result of its own, in place of one that may be flipped by hand. */
+  async function compute(options: EstimateOptions, form: Form, turned: Turned, itsFlips: Flip[], step: Step) {
+    const before = flippedNow();
+    await shadeBy(options, form, turned, step);
+    flips = itsFlips;
+    areSaved = false;
+    // A file that was just opened has none, and keeps what was told then.
+    if (before) leave(before, 'Re-run undid your flips.');
+  }
+
+  /** `form` is what asked for it, `turned` what a person turned by hand since it was computed last. */
+  async function shadeBy(options: EstimateOptions, form: Form, turned: Turned, step: Step): Promise<void> {
     const { scan, shading } = store.state;
     if (!shown || !scan) return;
     const { method = 'bilinear', k = 0, orient = 'none' } = options;
@@ -172,10 +217,10 @@ export function createSession(store: Store, viewer: Viewer): Session {
     const { flipped, turnedSurfaces } = turned;
     if (flipped) negate(result.normals);
     for (const surface of turnedSurfaces) negate(result.normals, result.components, surface);
-    shown = { ...shown, result, options };
+    shown = { ...shown, result, options, form };
     viewer.setNormals(result.normals, result.curvature && colorsOf(result.curvature));
     const hasCurvature = result.curvature !== undefined;
-    const used = { method, k, orient, asked };
+    const used = { method, k, orient, asked: askedBy(form, form.up) };
     store.set({ scan: { ...scan, hasNormals: true, hasCurvature }, report, used, ...turned, ...compared(shown) });
   }
 
@@ -194,6 +239,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
     if (!shown?.result) return;
     const { normals, components } = shown.result;
     negate(normals, surface === undefined ? undefined : components, surface);
+    areSaved = false;
     viewer.refreshNormals(normals);
     const { flipped } = store.state;
     const turnedSurfaces = new Set(store.state.turnedSurfaces);
@@ -201,9 +247,25 @@ export function createSession(store: Store, viewer: Viewer): Session {
     store.set({
       flipped: flipped !== (surface === undefined),
       turnedSurfaces,
-      wereReset: false,
       backs,
       ...compared(shown),
+    });
+  }
+
+  async function bringBack(): Promise<void> {
+    const back = gone;
+    if (!back) return;
+    await run(back.file.name, async (step) => {
+      const { note } = store.state;
+      if (shown?.file !== back.file) await show(back.file, step);
+      // What is cancelled now can be tried again, unless the other file had flips, too.
+      if (!gone) {
+        gone = back;
+        store.set({ note });
+      }
+      store.set(back.form);
+      await compute(back.options, back.form, back.turned, back.flips, step);
+      if (gone === back) leave(undefined, '');
     });
   }
 
@@ -216,14 +278,21 @@ export function createSession(store: Store, viewer: Viewer): Session {
       estimateNormals(warmingCloud(), { orient: 'consistent', components: true }).catch(ignore);
     },
 
-    async open(file) {
+    async open(files) {
+      const scans = files.length > 1 ? await onlyScans(files) : files;
+      const file = scans[0] ?? files[0];
+      if (!file) return;
       // What was dropped by mistake stops no work, unless that ends meanwhile.
-      if (current && !(await beginsAsPly(file)) && current) {
-        store.set({ error: `${ONLY_PLY}; ${file.name} is none, so the work goes on` });
+      const reason = current && (await foreign(file));
+      if (reason && current) {
+        store.set({ error: `${messageOf(file.name, reason)} The work goes on.` });
         return;
       }
       await run(file.name, async (step) => {
         await show(file, step);
+        // Unless there is more to lose.
+        const { note = { text: `The first of ${count(scans.length)} scans is shown.` } } = store.state;
+        if (scans.length > 1) store.set({ note });
         await shade(step);
       });
     },
@@ -238,12 +307,10 @@ export function createSession(store: Store, viewer: Viewer): Session {
     estimate: () => run('Computing normals', shade),
 
     async addCurvature() {
-      const { result, options } = shown ?? {};
-      const { flipped, turnedSurfaces, wereReset, used } = store.state;
-      if (!result || !options || !used || result.curvature) return;
-      await run('Computing curvature', (step) =>
-        shadeBy(options, used.asked, { flipped, turnedSurfaces, wereReset }, step),
-      );
+      const { result, options, form } = shown ?? {};
+      if (!result || !options || !form || result.curvature) return;
+      const { flipped, turnedSurfaces } = store.state;
+      await run('Computing curvature', (step) => shadeBy(options, form, { flipped, turnedSurfaces }, step));
     },
 
     showNormals(source) {
@@ -265,7 +332,10 @@ export function createSession(store: Store, viewer: Viewer): Session {
     undoFlip() {
       const last = flips.pop();
       if (last) turnRound(last.surface, store.state.backs && !last.broughtBacks);
+      else if (gone && gone.file === shown?.file) void bringBack();
     },
+
+    bringBack,
 
     save: () =>
       run('Saving', async (step) => {
@@ -277,7 +347,8 @@ export function createSession(store: Store, viewer: Viewer): Session {
           { normals, ...(curvature && { curvature }) },
           { signal: step.signal, onProgress: step.begin('Saving') },
         );
-        download(ply, `${file.name.replace(/\.[^.]*$/, '')}-normals.ply`);
+        areSaved = true;
+        download(ply, `${file.name.replace(/(-normals)?\.[^.]*$/, '')}-normals.ply`);
       }),
 
     cancel() {
@@ -299,12 +370,21 @@ function negate(normals: Float32Array, components?: Uint32Array, surface?: numbe
   }
 }
 
-/** As the reader takes it: in any case, and after a byte order mark, which `text` drops. What cannot be read says so then. */
-async function beginsAsPly(file: File): Promise<boolean> {
+/** Those that begin as PLY files do. */
+async function onlyScans(files: File[]): Promise<File[]> {
+  const reasons = await Promise.all(files.map(foreign));
+  return files.filter((_, i) => !reasons[i]);
+}
+
+async function read(file: File, { signal, begin }: Step): Promise<PointCloud> {
+  const onProgress = begin(`Reading ${file.name}`);
   try {
-    return /^ply/i.test(await file.slice(0, 6).text());
-  } catch {
-    return true;
+    // Refused there too, as data without memory for it.
+    if (file.size > FILE_MOST) throw new Error(tooLarge(file));
+    return await readPointCloud(file, { signal, onProgress });
+  } catch (error) {
+    // Which says what it is, and what to do with it.
+    throw (await foreign(file)) ?? error;
   }
 }
 
@@ -313,7 +393,7 @@ function makeSample(signal: AbortSignal): Promise<File> {
   return new Promise<File>((resolve, reject) => {
     signal.addEventListener('abort', () => reject(signal.reason));
     worker.onmessage = ({ data }: MessageEvent<Uint8Array<ArrayBuffer>>) => resolve(new File([data], 'sample.ply'));
-    worker.onerror = () => reject(new Error('the worker that makes the sample did not start'));
+    worker.onerror = () => reject(new Error('the script that makes it did not load'));
     worker.postMessage({ points: SAMPLE_POINTS });
   }).finally(() => worker.terminate());
 }
@@ -328,13 +408,8 @@ function download(blob: Blob, name: string): void {
 }
 
 function messageOf(trouble: string, error: unknown): string {
-  // Where a file begins tells nothing.
-  const message = (error instanceof Error ? error.message : String(error)).replace(/^byte 0: /, '');
-  if (!message.startsWith('not a PLY file')) return `${trouble}: ${message}`;
-  const what = message.replace(/; wanted 'ply' as the first line$/, '');
-  // What is packed, and text of another kind, comes with a remedy of its own.
-  const isTold = /^not a PLY file but .*[;,]/.test(what);
-  return `${ONLY_PLY}; ${trouble} is ${what}${isTold ? '' : `. ${REMEDY}`}`;
+  const message = error instanceof Error ? error.message : String(error);
+  return `${trouble}${error instanceof Foreign ? '' : ':'} ${message}`;
 }
 
 function tooLarge({ size }: File): string {

@@ -35,11 +35,15 @@ export interface Turned {
   flipped: boolean;
   /** Those of single surfaces, besides. */
   turnedSurfaces: ReadonlySet<number>;
-  /** Whether there were such before the normals were computed anew. */
-  wereReset: boolean;
 }
 
-export const UNTURNED: Turned = { flipped: false, turnedSurfaces: new Set(), wereReset: false };
+export const UNTURNED: Turned = { flipped: false, turnedSurfaces: new Set() };
+
+export interface Note {
+  text: string;
+  /** Whether it is of flips by hand that can be brought back. */
+  isOfFlips?: boolean;
+}
 
 export interface State extends OptionsForm, Turned {
   /** Whether files can be taken: false until the browser has been looked at. */
@@ -56,6 +60,8 @@ export interface State extends OptionsForm, Turned {
   comparison: Comparison | undefined;
   job: Job | undefined;
   error: string | undefined;
+  /** What else there is to know: nothing went wrong. */
+  note: Note | undefined;
   shading: Shading;
   source: NormalSource;
   /** Whether what points away from the camera has a colour of its own. */
@@ -84,6 +90,7 @@ export function createStore(): Store {
     comparison: undefined,
     job: undefined,
     error: undefined,
+    note: undefined,
     shading: 'shaded',
     source: 'computed',
     backs: false,

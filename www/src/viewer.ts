@@ -67,6 +67,11 @@ const BACK = '#ff3d8b';
 const SPARSE_FROM = 200_000;
 const SPARSE_MOST = 2_000_000;
 const SPARSE_LEAST = 60_000;
+/** A still cloud of more than `SPARSE_MOST` is drawn by many frames, of so many points: slow machines answer between them. */
+const FILL_LEAST = 100_000;
+const FILL_MOST = 8_000_000;
+const FAST_FILL = 50;
+const SLOW_FILL = 150;
 /** Frame times between these two, in milliseconds, leave the number of points as it is. */
 const FAST_FRAME = 20;
 const SLOW_FRAME = 36;
@@ -79,7 +84,18 @@ const LARGEST = 0.2;
 
 export function createViewer(canvas: HTMLCanvasElement): Viewer {
   const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
-  const renderer = new WebGLRenderer({ canvas, alpha: true, antialias: false, powerPreference: 'high-performance' });
+  const renderer = new WebGLRenderer({
+    canvas,
+    alpha: true,
+    antialias: false,
+    powerPreference: 'high-performance',
+    // A large cloud is added to the frame before, until it is whole.
+    preserveDrawingBuffer: true,
+  });
+  const cover = document.createElement('canvas');
+  cover.className = 'cover';
+  cover.hidden = true;
+  canvas.after(cover);
   const camera = new PerspectiveCamera(38, 1, 0.01, 100);
   camera.position.set(0, 0, 3);
   const controls = new OrbitControls(camera, canvas);
@@ -124,8 +140,17 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   let lastMove = -Infinity;
   let wasMoving = false;
   let affordable = SPARSE_MOST;
+  /** How many points the picture of a still cloud has, and gets by the next frame. */
+  let filled = 0;
+  let filling = SPARSE_MOST / 4;
 
+  /** Draws anew. */
   function request(): void {
+    filled = 0;
+    proceed();
+  }
+
+  function proceed(): void {
     if (frame === 0) frame = requestAnimationFrame(draw);
   }
 
@@ -133,16 +158,49 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     frame = 0;
     controls.update();
     const moving = now - lastMove < STILL;
+    const elapsed = now - lastFrame;
     // Before the first frame of a movement lies a gap, which says nothing.
-    if (moving && wasMoving) adapt(now - lastFrame);
+    if (moving && wasMoving) adapt(elapsed);
     wasMoving = moving;
     lastFrame = now;
-    const drawn = moving ? thinOut() : 1;
-    if (!moving) points.geometry = whole;
     setDepthRange();
-    setSize(drawn);
+    if (!moving) return fill(elapsed);
+    cover.hidden = true;
+    drawPart(affordable);
+    request();
+  }
+
+  function drawPart(most: number): void {
+    setSize(thinOut(most));
     renderer.render(scene, camera);
-    if (moving) request();
+  }
+
+  /** Draws the next points of a still cloud. Until it is whole, what is drawn in motion lies over it. */
+  function fill(elapsed: number): void {
+    const all = cloud ? cloud.positions.length / 3 : 0;
+    const isLarge = all > SPARSE_MOST;
+    if (filled > 0 && elapsed > SLOW_FILL) filling = Math.max(FILL_LEAST, filling / 2);
+    else if (filled > 0 && elapsed < FAST_FILL) filling = Math.min(FILL_MOST, filling * 2);
+    if (isLarge && filled === 0) {
+      settle();
+      // Or it would begin again, for less than can be seen.
+      lastMove = -Infinity;
+      drawPart(Math.min(affordable, filling));
+      cover.width = canvas.width;
+      cover.height = canvas.height;
+      cover.getContext('2d')!.drawImage(canvas, 0, 0);
+      cover.hidden = false;
+    }
+    points.geometry = whole;
+    setSize(1);
+    const some = isLarge ? filling : all;
+    whole.setDrawRange(filled, some);
+    renderer.autoClear = filled === 0;
+    renderer.render(scene, camera);
+    renderer.autoClear = true;
+    filled += some;
+    if (filled < all) proceed();
+    else cover.hidden = true;
   }
 
   /** Learns from the time since the last frame how many points this machine draws smoothly. */
@@ -153,14 +211,14 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     else if (elapsed < FAST_FRAME) affordable = Math.min(SPARSE_MOST, affordable * 1.08);
   }
 
-  /** Chooses the geometry of a frame in motion; returns the share of the points that it draws. */
-  function thinOut(): number {
+  /** Chooses the geometry for so many points at the most; returns the share of all that it draws. */
+  function thinOut(most: number): number {
     const all = cloud ? cloud.positions.length / 3 : 0;
-    if (!sparse || affordable >= all) {
+    if (!sparse || most >= all) {
       points.geometry = whole;
       return 1;
     }
-    const some = Math.min(Math.floor(affordable), sparse.index!.count);
+    const some = Math.min(Math.floor(most), sparse.index!.count);
     sparse.setDrawRange(0, some);
     points.geometry = sparse;
     return some / all;
@@ -213,14 +271,19 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     turned.rotation.z = up === 'x' ? right : up === '-x' ? -right : 0;
   }
 
+  /** Spends what is left of a movement, as an update without damping does. */
+  function settle(): void {
+    controls.enableDamping = false;
+    controls.update();
+    controls.enableDamping = !calm;
+  }
+
   function fit(): void {
     if (!bounds) return;
     // A window without a size is framed when it gets one.
     framed = true;
     if (canvas.clientWidth === 0 || canvas.clientHeight === 0) return;
-    // Without damping an update spends what is left of a movement.
-    controls.enableDamping = false;
-    controls.update();
+    settle();
     const [x, y, z] = bounds.extent;
     const box = new Vector3(x, y, z).applyEuler(turned.rotation);
     const flat = 1 - Math.min(1, Math.abs(box.y) / Math.max(Math.abs(box.x), Math.abs(box.z), Number.MIN_VALUE));
@@ -236,7 +299,6 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     controls.minDistance = 1e-3;
     controls.maxDistance = Math.max(reach, distance) * 20;
     controls.update();
-    controls.enableDamping = !calm;
     // A jump, not a movement: draw all of it at once.
     lastMove = -Infinity;
     // The updates above told of a change.
