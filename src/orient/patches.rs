@@ -400,6 +400,12 @@ pub(super) fn signed<T: Neg<Output = T>>(is_flipped: bool, one: T) -> T {
     if is_flipped { -one } else { one }
 }
 
+/// The same for a number, without a jump: nothing foretells who is flipped.
+#[inline(always)]
+pub(super) fn turned(is_flipped: bool, one: f32) -> f32 {
+    f32::from_bits(one.to_bits() ^ u32::from(is_flipped) << 31)
+}
+
 /// Orders places in a brick by x, then y, then z. Numbers that are not negative have their bits in their order.
 fn key(place: Vec3) -> u64 {
     let [x, y, z] = place.to_array().map(|coordinate| u64::from(coordinate.to_bits() >> 10));
