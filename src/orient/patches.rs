@@ -243,7 +243,8 @@ fn split(
             order.push((key(point.local), i as u32));
         }
     }
-    sort_few(order);
+    // The first bits of the key are those of x.
+    sort_few(order, |(key, _)| (key >> 42) as f32);
     // From here on the number of each one's patch in place of its key.
     for (number_or_key, i) in &mut *order {
         let i = *i as usize;
