@@ -24,7 +24,7 @@ use crate::parallel::Scatter;
 use crate::points::Points;
 use crate::progress::Stage;
 use crate::surroundings::{Places, STEPS, Surroundings};
-use glam::{Vec3, Vec4};
+use glam::{Vec3, Vec4, Vec4Swizzles};
 
 /// What errors call the memory of all this.
 const WHAT: &str = "the means of normals";
@@ -112,8 +112,9 @@ pub(super) fn average(
             let count: usize = places().map(|place| grid.points_of(surroundings.cube(place)).len()).sum();
             around.clear();
             for place in places() {
-                let others = members.of_cube(grid, surroundings.cube(place));
-                let number = near.cube(place, others.map(|(point, _)| (position(point), known[point])))?;
+                let cube = surroundings.cube(place);
+                let (count, others) = (grid.points_of(cube).len(), members.of_cube(grid, cube));
+                let number = near.cube(place, count, others.map(|(point, _)| (position(point), known[point])))?;
                 around.add(number, &near.cubes[number]);
             }
             grow(&mut means, grid.points_of(cube).len(), WHAT)?;
@@ -163,13 +164,15 @@ fn deviation<'a>(patches: impl Iterator<Item = &'a Patch>, noise: f32) -> f32 {
 /// What is known of the cubes in and round a brick.
 struct Near {
     cubes: Vec<Cube>,
+    /// The points of one, as [`Cube::of`] takes them.
+    points: Vec<[Vec4; 2]>,
     /// For each place the number of its cube, if that was asked for.
     numbers: [Option<usize>; Places::COUNT],
 }
 
 impl Near {
     fn new() -> Self {
-        Self { cubes: Vec::new(), numbers: [None; Places::COUNT] }
+        Self { cubes: Vec::new(), points: Vec::new(), numbers: [None; Places::COUNT] }
     }
 
     fn clear(&mut self) {
@@ -177,15 +180,18 @@ impl Near {
         self.numbers.fill(None);
     }
 
-    /// The number of the cube at a place, which holds these points: where they are, in edges, and their normals.
-    fn cube(&mut self, place: usize, points: impl Iterator<Item = (Vec3, Vec3)> + Clone) -> Result<usize, Error> {
+    /// The number of the cube at a place, which holds `count` points: where they are, in edges, and their normals.
+    fn cube(&mut self, place: usize, count: usize, points: impl Iterator<Item = (Vec3, Vec3)>) -> Result<usize, Error> {
         if let Some(number) = self.numbers[place] {
             return Ok(number);
         }
         grow(&mut self.cubes, 1, WHAT)?;
+        self.points.clear();
+        grow(&mut self.points, count, WHAT)?;
+        self.points.extend(points.map(|(place, normal)| [place.extend(1.0), normal.extend(0.0)]));
         let number = self.cubes.len();
         self.numbers[place] = Some(number);
-        self.cubes.push(Cube::of(points));
+        self.cubes.push(Cube::of(&self.points));
         Ok(number)
     }
 }
@@ -261,28 +267,32 @@ struct Octants {
 }
 
 impl Cube {
-    fn of(points: impl Iterator<Item = (Vec3, Vec3)> + Clone) -> Self {
-        let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
-        for (position, _) in points.clone() {
-            (low, high) = (low.min(position), high.max(position));
+    /// Of points: where each is, and 1, and its normal.
+    fn of(points: &[[Vec4; 2]]) -> Self {
+        let (mut low, mut high) = (Vec4::MAX, Vec4::MIN);
+        for &[place, _] in points {
+            low = Vec4::select(place.cmplt(low), place, low);
+            high = Vec4::select(place.cmpgt(high), place, high);
         }
-        let [middle, half] = [low + high, high - low].map(|sum| 0.5 * sum);
-        let mut sums = [(Vec3::ZERO, Vec3::ZERO, 0.0); 8];
-        for (position, normal) in points {
-            let (place, along, count) = &mut sums[position.cmpge(middle).bitmask() as usize];
-            *place += position - middle;
-            *along += normal;
-            *count += 1.0;
+        let [middle, half] = [low + high, high - low].map(|sum| (0.5 * sum).with_w(0.0));
+        let mut sums = [[Vec4::ZERO; 2]; 8];
+        for &[place, along] in points {
+            let sums = &mut sums[place.cmpge(middle).bitmask() as usize & 7];
+            // And how many there are.
+            sums[0] += place - middle;
+            sums[1] += along;
         }
         let octants = [0, 4].map(|first| {
-            let four: [_; 4] = std::array::from_fn(|i| sums[first + i]);
+            let rows = |sum: usize| transposed(std::array::from_fn(|i| sums[first + i][sum]));
+            let ([x, y, z, counts], [along_x, along_y, along_z, _]) = (rows(0), rows(1));
             // Where there is none, beyond any reach.
-            let mean = |place: Vec3, count: f32| if count > 0.0 { middle + place / count } else { Vec3::splat(FAR) };
-            let [x, y, z, _] = transposed(four.map(|(place, _, count)| mean(place, count).extend(0.0)));
-            let [along_x, along_y, along_z, counts] = transposed(four.map(|(_, along, count)| along.extend(count)));
-            Octants { places: [x, y, z], along: [along_x, along_y, along_z], counts }
+            let mean = |sums: Vec4, middle: f32| {
+                Vec4::select(counts.cmpgt(Vec4::ZERO), middle + sums / counts, Vec4::splat(FAR))
+            };
+            let places = [mean(x, middle.x), mean(y, middle.y), mean(z, middle.z)];
+            Octants { places, along: [along_x, along_y, along_z], counts }
         });
-        Self { middle, half, octants }
+        Self { middle: middle.xyz(), half: half.xyz(), octants }
     }
 }
 
@@ -318,7 +328,8 @@ mod tests {
     fn both_sides_of_a_wall_agree_on_its_rim() {
         let sides = [0.1, -0.1].map(|z| {
             let points = (0..100).map(move |i| Vec3::new(-0.05 * (i % 10) as f32, 0.1 * (i / 10) as f32 - 0.45, z));
-            Cube::of(points.map(move |place| (place, Vec3::Z * z.signum())))
+            let points: Vec<[Vec4; 2]> = points.map(|place| [place.extend(1.0), Vec4::Z * z.signum()]).collect();
+            Cube::of(&points)
         });
         let rim = mean(sides.iter(), Vec3::ZERO, 0.4);
         assert!(rim.normalize().x > 0.99, "{rim}");
