@@ -34,12 +34,12 @@ pub(crate) fn deviation(values: &mut Vec<f32>) -> f32 {
     /// Of normally distributed values the median of the gaps times their number, in deviations.
     const GAPS: f32 = 2.2;
     let count = values.len() as f32;
-    sort_few(values);
+    sort_few(values, |value| value);
     for i in 1..values.len() {
         values[i - 1] = values[i] - values[i - 1];
     }
     values.pop();
-    sort_few(values);
+    sort_few(values, |value| value);
     values[values.len() / 2] * count / GAPS
 }
 

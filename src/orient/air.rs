@@ -11,12 +11,12 @@ use crate::median::ranked;
 use crate::parallel::{Filling, Gathering};
 use crate::progress::Stage;
 use crate::surroundings::STEPS;
-use glam::{IVec3, Vec3};
+use glam::{IVec3, Vec3, Vec4};
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// Directions in which to look for the open air: to the faces, edges and corners of a cube, all steps but that to itself.
-const DIRECTIONS: usize = STEPS.len() - 1;
+pub(super) const DIRECTIONS: usize = STEPS.len() - 1;
 
 /// A surface that is open to one half of space sees it with some 9 of the directions.
 const HALF: f32 = 9.0;
@@ -108,9 +108,7 @@ pub(super) fn sights(
             let range = patches.of_cube(cube);
             let own = &patches.all[range.clone()];
             for (number, patch) in range.zip(own) {
-                // Mostly it is alone, and does not hide itself.
-                let is_seen = |&number: &u32| own.len() == 1 || !is_hidden(patch, own, direction(number as usize));
-                let seen = set_bits(seen.into()).filter(is_seen).fold(0, |seen: u32, number| seen | 1 << number);
+                let seen = seen & !hidden(patch, own);
                 let along = |number: u32| (units[number as usize].dot(patch.normal) / HALF).abs();
                 // SAFETY: a patch belongs to one cube, and a cube to one block.
                 unsafe {
@@ -124,21 +122,45 @@ pub(super) fn sights(
     Ok(unsafe { Sights { exposure: exposures.complete(), all: sums.complete() } })
 }
 
-/// Whether in a direction another patch of the cube hides from one what lies beyond: its plane lies there, and the direction
-/// stays on the side of the patch on which the other one lies, so that round a convex edge neither hides anything before the
-/// faces. Else the two sides of a thin wall would both see what is before each, and the deep side of a blade's edge what is
+/// A bit for each direction in which another patch of the cube hides from one what lies beyond: its plane lies there, and the
+/// direction stays on the side of the patch on which the other one lies, so that round a convex edge neither hides anything before
+/// the faces. Else the two sides of a thin wall would both see what is before each, and the deep side of a blade's edge what is
 /// before the other.
-pub(super) fn is_hidden(patch: &Patch, own: &[Patch], direction: IVec3) -> bool {
-    let direction = direction.as_vec3();
-    own.iter().any(|other| {
+pub(super) fn hidden(patch: &Patch, own: &[Patch]) -> u32 {
+    let mut hidden = 0;
+    for other in own {
         let line = other.centre - patch.centre;
-        let is_there = |normal: Vec3| normal.dot(line) * normal.dot(direction) > 0.0;
-        is_there(other.normal) && is_there(patch.normal)
-    })
+        // None for the patch itself, which mostly is alone.
+        let sides = [other, patch].map(|one| (one.normal, one.normal.dot(line)));
+        if sides.iter().any(|&(_, side)| side == 0.0) {
+            continue;
+        }
+        for (four, directions) in FOURS.iter().enumerate() {
+            let [x, y, z] = directions.map(Vec4::from_array);
+            let is_there =
+                |(normal, side): (Vec3, f32)| (side * (normal.x * x + normal.y * y + normal.z * z)).cmpgt(Vec4::ZERO);
+            hidden |= (is_there(sides[0]) & is_there(sides[1])).bitmask() << (4 * four);
+        }
+    }
+    hidden
 }
 
-fn direction(number: usize) -> IVec3 {
-    STEPS[number + usize::from(number >= DIRECTIONS / 2)]
+/// The directions four by four; none for the last two.
+const FOURS: [[[f32; 4]; 3]; 7] = {
+    let mut fours = [[[0.0; 4]; 3]; 7];
+    let mut number = 0;
+    while number < DIRECTIONS {
+        let IVec3 { x, y, z } = direction(number);
+        let four = &mut fours[number / 4];
+        (four[0][number % 4], four[1][number % 4], four[2][number % 4]) = (x as f32, y as f32, z as f32);
+        number += 1;
+    }
+    fours
+};
+
+/// That of a number; the opposite one has the number that stands as far from the end.
+pub(super) const fn direction(number: usize) -> IVec3 {
+    STEPS[if number < DIRECTIONS / 2 { number } else { number + 1 }]
 }
 
 /// The sum of the directions that are set. What is open to opposite directions alike sums up to nothing, to the bit: rounding
@@ -351,9 +373,10 @@ mod tests {
     fn one_side_of_a_wall_does_not_see_what_lies_behind_the_other() {
         let wall = [patch(0.3 * Vec3::Z, 9), patch(0.1 * Vec3::Z, 9)];
         for (number, upwards) in [(0, true), (1, false)] {
-            for direction in (0..DIRECTIONS).map(direction) {
+            let hidden = hidden(&wall[number], &wall);
+            for (i, direction) in (0..DIRECTIONS).map(direction).enumerate() {
                 let is_before = if upwards { direction.z >= 0 } else { direction.z <= 0 };
-                assert_eq!(!is_hidden(&wall[number], &wall, direction), is_before, "{number} {direction}");
+                assert_eq!(hidden >> i & 1 == 0, is_before, "{number} {direction}");
             }
         }
     }
@@ -362,16 +385,13 @@ mod tests {
     fn the_faces_of_a_convex_edge_hide_nothing_before_them() {
         let top = patch(Vec3::new(-0.2, 0.0, 0.0), 9);
         let side = Patch { normal: Vec3::X, ..patch(Vec3::new(0.0, 0.0, -0.2), 9) };
-        for direction in (0..DIRECTIONS).map(direction) {
+        for (i, direction) in (0..DIRECTIONS).map(direction).enumerate() {
             // What the other hides lies beyond it and below the own face.
             for (own, other, depth, ahead) in
                 [(&top, &side, direction.z, direction.x), (&side, &top, direction.x, direction.z)]
             {
-                assert_eq!(
-                    is_hidden(own, std::slice::from_ref(other), direction),
-                    depth < 0 && ahead > 0,
-                    "{direction}"
-                );
+                let is_hidden = hidden(own, std::slice::from_ref(other)) >> i & 1 == 1;
+                assert_eq!(is_hidden, depth < 0 && ahead > 0, "{direction}");
             }
         }
     }

@@ -39,9 +39,15 @@ impl Eye {
     }
 
     /// The direction to it from a place, which is counted from the middle, of whatever length.
-    #[inline(always)]
     pub fn direction(&self, place: Vec3) -> Vec3 {
-        self.towards.as_vec3() - (self.nearness / self.radius) as f32 * place
+        self.directions()(place)
+    }
+
+    /// The same, for many places.
+    #[inline(always)]
+    fn directions(&self) -> impl Fn(Vec3) -> Vec3 + use<> {
+        let (towards, nearness) = (self.towards.as_vec3(), (self.nearness / self.radius) as f32);
+        move |place| towards - nearness * place
     }
 
     /// The cosine of the angle at which a surface is seen; less than zero from behind.
@@ -172,17 +178,23 @@ impl Turned {
         patches: impl Fn() -> I,
         components: usize,
     ) -> Result<Self, Error> {
+        let direction = eye.directions();
+        // A patch with what of its points faces away: all or none. Without a jump, because nothing foretells which.
+        let missed_of = |patch: &Signed| {
+            let is_away = patch.normal.dot(direction(patch.place)) < 0.0;
+            Signed { points: patch.points * u32::from(is_away), ..*patch }
+        };
         // For each its points, and those of them that face away.
-        let mut counts = filled((0.0, 0.0), components, WHAT)?;
+        let mut counts = filled((0u32, 0u32), components, WHAT)?;
         for patch in patches() {
             let (all, away) = &mut counts[patch.component as usize];
-            let points = f64::from(patch.points);
-            *all += points;
-            *away += if patch.normal.dot(eye.direction(patch.place)) < 0.0 { points } else { 0.0 };
+            *all += patch.points;
+            *away += missed_of(&patch).points;
         }
         let mut components = Vec::new();
         reserve(&mut components, counts.len(), WHAT)?;
         components.extend(counts.into_iter().map(|(all, away)| {
+            let (all, away) = (f64::from(all), f64::from(away));
             let (is_flipped, away) = (2.0 * away > all, away.min(all - away) / all);
             (away <= MIXED).then_some(Seen { is_flipped, away })
         }));
@@ -194,9 +206,7 @@ impl Turned {
             let patch = patch.turned(is_flipped);
             missed.all += points;
             sum += points * patch.normal.as_dvec3();
-            if patch.normal.dot(eye.direction(patch.place)) < 0.0 {
-                missed.add(&patch);
-            }
+            missed.add(&missed_of(&patch));
         }
         Ok(Self { components, mixed: 1.0 - missed.all / all, missed, normal: sum })
     }

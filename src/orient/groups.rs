@@ -4,7 +4,7 @@
 use super::air::Sights;
 use super::links::{GRAPH, Link, Links};
 use super::looks::{Look, Looks};
-use super::patches::{Patches, signed};
+use super::patches::{Patches, turned};
 use crate::error::Error;
 use crate::lists::{filled, reserve, starts};
 use crate::parallel::{self, Filling};
@@ -54,7 +54,7 @@ impl Groups {
             let merged = gather(&links, &group, &flipped, groups, &stage.part(0.5..1.0))?;
             let mut sums = filled(0.0, groups, GRAPH)?;
             for (one, &group) in group.iter().enumerate() {
-                sums[group as usize] += signed(flipped[one], own[one]);
+                sums[group as usize] += turned(flipped[one], own[one]);
             }
             let mut counts = filled(0, groups, GRAPH)?;
             group.iter().zip(&sizes).for_each(|(&group, &size)| counts[group as usize] += size);
@@ -183,13 +183,13 @@ const LOOK: f32 = 0.2;
 
 /// What the evidence says to the sign of one, given those of the others.
 fn support(links: &Links, flipped: &[bool], one: usize) -> f32 {
-    let sum: f32 = links.from(one).iter().map(|link| signed(flipped[link.to as usize], link.evidence)).sum();
-    signed(flipped[one], sum)
+    let sum: f32 = links.from(one).iter().map(|link| turned(flipped[link.to as usize], link.evidence)).sum();
+    turned(flipped[one], sum)
 }
 
 /// The share of one in the sum of all evidence: half of each of its links.
 fn score(links: &Links, own: &[f32], flipped: &[bool], one: usize) -> f64 {
-    f64::from(support(links, flipped, one)) / 2.0 + f64::from(signed(flipped[one], own[one]))
+    f64::from(support(links, flipped, one)) / 2.0 + f64::from(turned(flipped[one], own[one]))
 }
 
 /// Which groups become one.
@@ -318,7 +318,7 @@ fn gather(links: &Links, group: &[u32], flipped: &[bool], groups: usize, stage: 
                         if to as usize == one {
                             continue;
                         }
-                        let evidence = signed(flipped[member as usize] ^ flipped[link.to as usize], link.evidence);
+                        let evidence = turned(flipped[member as usize] ^ flipped[link.to as usize], link.evidence);
                         let place = &mut places[to as usize];
                         if !(start..list.len()).contains(place) || list[*place].to != to {
                             *place = list.len();
@@ -350,7 +350,7 @@ fn mend(
     let levels = || iter::once(links).chain(across);
     let gains = |flipped: &[bool], one: usize| {
         let evidence: f32 = levels().map(|links| support(links, flipped, one)).sum();
-        evidence + signed(flipped[one], own(one)) < -LEAST
+        evidence + turned(flipped[one], own(one)) < -LEAST
     };
     // Who is to be asked: who gains as it is, and then whose neighbours changed since.
     let mut is_stirred = each(flipped.len(), stage, |one| gains(flipped, one))?;

@@ -10,6 +10,7 @@ use crate::parallel::Filling;
 use crate::progress::Stage;
 use crate::surroundings::{NEAR, Places, STEPS, Surroundings};
 use glam::{Vec3, Vec4, Vec4Swizzles};
+use std::ops::Range;
 
 /// What errors call the memory of the links.
 pub(super) const GRAPH: &str = "the graph of patches";
@@ -70,6 +71,7 @@ impl Links {
         let lists = stage.collect(grid.blocks.len(), GRAPH, &|block| {
             let mut surroundings = Surroundings::new();
             let (mut near, mut fours, mut links) = (Vec::new(), Vec::new(), Vec::new());
+            let (mut told, mut shares) = (Vec::new(), Vec::new());
             grow(&mut near, STEPS.len() * MOST, GRAPH)?;
             grow(&mut fours, STEPS.len() * MOST / 4, GRAPH)?;
             let mut looked_at = None;
@@ -85,22 +87,31 @@ impl Links {
                 fours.clear();
                 fours.extend(near.chunks(4).map(|near| Four::of(patches, near)));
                 let all = patches.of_cube(cube);
+                // For each patch of the cube those near it, four by four.
+                let pairs = all.len() * fours.len();
+                told.clear();
+                shares.clear();
+                grow(&mut told, pairs, GRAPH)?;
+                grow(&mut shares, pairs, GRAPH)?;
+                told.extend(
+                    all.clone().flat_map(|own| fours.iter().map(move |four| four.look(&patches.all[own], squarings))),
+                );
+                shares.resize(pairs, [Vec4::ONE; 2]);
+                if is_clean && near.iter().any(|&(patch, _)| patches.all[patch].has_rival) {
+                    share(&patches.all, &near, &told, &mut shares);
+                }
                 grow(&mut links, all.len() * near.len(), GRAPH)?;
-                for own in all.clone() {
-                    let (start, patch) = (links.len(), &patches.all[own]);
-                    for (near, four) in near.chunks(4).zip(&fours) {
-                        let evidence_of = four.evidence(patch, squarings);
-                        let says = evidence_of.abs().cmpgt(Vec4::splat(LEAST)).bitmask();
-                        for ((lane, mut evidence), &(to, place)) in (0..).zip(evidence_of.to_array()).zip(near) {
-                            if says >> lane & 1 == 0 || to == own {
-                                continue;
+                for (i, own) in all.enumerate() {
+                    let start = links.len();
+                    let row = i * fours.len()..(i + 1) * fours.len();
+                    for ((near, told), share) in near.chunks(4).zip(&told[row.clone()]).zip(&shares[row]) {
+                        let says = told.evidence.abs().cmpgt(Vec4::splat(LEAST)).bitmask();
+                        // One product, so that it is the same to the bit from both ends.
+                        let evidence = (told.evidence * (share[0] * share[1])).to_array();
+                        for ((lane, evidence), &(to, _)) in (0..).zip(evidence).zip(near) {
+                            if says >> lane & 1 == 1 && to != own {
+                                links.push(Link { to: to as u32, evidence });
                             }
-                            let other = &patches.all[to];
-                            if is_clean && (patch.has_rival || other.has_rival) && place != Places::NEAR_CENTRE {
-                                let beside = [all.clone(), of_place(place)].map(|cube| &patches.all[cube]);
-                                evidence *= shares([patch, other], beside, NEAR[place as usize % 64].xyz());
-                            }
-                            links.push(Link { to: to as u32, evidence });
                         }
                     }
                     // SAFETY: a patch belongs to one cube, and a cube to one block.
@@ -196,8 +207,19 @@ struct Four {
     step: [Vec4; 3],
     centre: [Vec4; 3],
     normal: [Vec4; 3],
+    bend: Vec4,
     flatness: Vec4,
     certainty: Vec4,
+}
+
+/// What four patches and another one say to each other.
+struct Told {
+    /// Whether they agree.
+    evidence: Vec4,
+    /// The squares of how far two lie off each other's planes, or off what these bend to, and a little more.
+    off: Vec4,
+    /// The same, or zero where it is no difference.
+    apart: Vec4,
 }
 
 impl Four {
@@ -209,17 +231,19 @@ impl Four {
         let rows = |row: &dyn Fn(usize) -> Vec4| transposed([row(0), row(1), row(2), row(3)]);
         let [x, y, z, flatness] = rows(&|lane| patch(lane).centre.extend(patch(lane).flatness));
         let [along_x, along_y, along_z, certainty] = rows(&|lane| patch(lane).normal.extend(patch(lane).certainty()));
-        let [step_x, step_y, step_z, _] = rows(&|lane| NEAR[near[lane].1 as usize % 64]);
+        let step = |lane: usize| NEAR[near[lane].1 as usize % 64];
+        let [step_x, step_y, step_z, bend] = rows(&|lane| step(lane).xyz().extend(patch(lane).bend));
         Self {
             step: [step_x, step_y, step_z],
             centre: [x, y, z],
             normal: [along_x, along_y, along_z],
+            bend,
             flatness,
             certainty,
         }
     }
 
-    /// Whether each agrees with a patch of that cube.
+    /// What each says about a patch of that cube.
     ///
     /// The first normal is reflected at the plane across the line between their centres: so the normals at both ends of an arc
     /// of a circle are each other's picture, also at a right-angled crease and on the two sides of a thin plate, where the
@@ -227,7 +251,7 @@ impl Four {
     /// data sets", 2004). The less alike the picture, the more likely these are two sheets: hence the power. A line along the
     /// normals is no evidence, as noise of one surface and both sides of a wall look the same.
     #[inline(always)]
-    fn evidence(&self, patch: &Patch, squarings: usize) -> Vec4 {
+    fn look(&self, patch: &Patch, squarings: usize) -> Told {
         let dot =
             |[x, y, z]: [Vec4; 3], [other_x, other_y, other_z]: [Vec4; 3]| x * other_x + y * other_y + z * other_z;
         let splat = |vector: Vec3| vector.to_array().map(Vec4::splat);
@@ -235,7 +259,8 @@ impl Four {
         // So that the other way round it is the opposite to the bit.
         let line = [0, 1, 2].map(|axis| self.step[axis] + (self.centre[axis] - centre[axis]));
         let (square, alike) = (dot(line, line), dot(normal, self.normal));
-        let across = dot(line, normal) * dot(line, self.normal) / square;
+        let (along, other_along) = (dot(line, normal), dot(line, self.normal));
+        let across = along * other_along / square;
         let reflected = alike - 2.0 * across;
         let fourth = power(reflected, LEAST_SQUARINGS);
         let sharp = power(fourth, squarings - LEAST_SQUARINGS);
@@ -243,40 +268,74 @@ impl Four {
         let certainty = Vec4::select(certainty.cmplt(self.certainty), certainty, self.certainty);
         let trust = patch.flatness * self.flatness * root(certainty);
         let evidence = reflected * ((sharp + BLUNT * fourth) / (1.0 + BLUNT)) * (1.0 - across.abs()) * trust;
-        // In one place: between centres less than a fiftieth of an edge apart there is no line, only two normals that cross.
-        Vec4::select(square.cmplt(Vec4::splat(4e-4)), alike * alike * alike, evidence)
-    }
-}
-
-/// What is left of the evidence between two patches where either has rivals among those of its cube; the second cube lies `step`
-/// from the first.
-#[inline(always)]
-fn shares([a, b]: [&Patch; 2], [of_a, of_b]: [&[Patch]; 2], step: Vec3) -> f32 {
-    let from_a = if b.has_rival { share(a, b, of_b, step) } else { 1.0 };
-    let from_b = if a.has_rival { share(b, a, of_a, -step) } else { 1.0 };
-    // One product, so that it is the same to the bit from both ends.
-    from_a * from_b
-}
-
-/// A sheet goes on in one sheet: what is left of the evidence between two patches, from 1 down to 0, where a rival of the
-/// second one, which has some, of `all` in its cube, lies better in line with the first.
-#[inline(never)]
-fn share(a: &Patch, b: &Patch, all: &[Patch], step: Vec3) -> f32 {
-    // How far the two lie off each other's planes, or off what these bend to.
-    let off = |other: &Patch| {
-        let line = step + (other.centre - a.centre);
-        let rise = 0.5 * line.length_squared();
-        let (x, y) = (line.dot(a.normal) - rise * a.bend, line.dot(other.normal) + rise * other.bend);
-        x * x + y * y + EVEN
-    };
-    let mut share: f32 = 1.0;
-    let own = off(b);
-    if own > 2.0 * EVEN {
-        for rival in all.iter().filter(|rival| !std::ptr::eq(*rival, b)) {
-            share = share.min(off(rival) / (own * b.likeness(rival) * rival.certainty()));
+        let rise = 0.5 * square;
+        let (own, other) = (along - rise * patch.bend, other_along + rise * self.bend);
+        let off = own * own + other * other + EVEN;
+        Told {
+            // In one place: between centres less than a fiftieth of an edge apart there is no line, only two normals that cross.
+            evidence: Vec4::select(square.cmplt(Vec4::splat(4e-4)), alike * alike * alike, evidence),
+            off,
+            apart: Vec4::select(off.cmpgt(Vec4::splat(2.0 * EVEN)), off, Vec4::ZERO),
         }
     }
-    share
+}
+
+/// A sheet goes on in one sheet: what is left of the evidence between each patch of a cube and those near it in others, from 1
+/// down to 0, where a rival of that near it lies better in line, and where one of its own does. Both `told` and `shares` have for
+/// each patch of the cube a row with those near it, four by four.
+#[inline(never)]
+fn share(patches: &[Patch], near: &[(usize, u32)], told: &[Told], shares: &mut [[Vec4; 2]]) {
+    let width = near.len().div_ceil(4);
+    let rows = told.len() / width;
+    let (mut own, mut next) = (0..0, 0);
+    for cube in near.chunk_by(|one, other| one.1 == other.1) {
+        let numbers = next..next + cube.len();
+        next = numbers.end;
+        if cube[0].1 == Places::NEAR_CENTRE {
+            own = numbers;
+            continue;
+        }
+        each_rival(patches, near, numbers, |one, rival, [likeness, certainty]| {
+            for row in (0..rows).map(|row| row * width) {
+                let (off, apart) =
+                    (told[row + rival / 4].off.as_ref()[rival % 4], told[row + one / 4].apart.as_ref()[one % 4]);
+                let left = off / (apart * likeness * certainty);
+                let share = &mut shares[row + one / 4][0].as_mut()[one % 4];
+                *share = if left < *share { left } else { *share };
+            }
+        });
+    }
+    let row = |number: usize| (number - own.start) * width;
+    each_rival(patches, near, own.clone(), |one, rival, [likeness, certainty]| {
+        for four in 0..width {
+            let left = told[row(rival) + four].off / (told[row(one) + four].apart * likeness * certainty);
+            let share = &mut shares[row(one) + four][1];
+            *share = Vec4::select(left.cmplt(*share), left, *share);
+        }
+    });
+    for (one, number) in own.clone().flat_map(|one| own.clone().map(move |other| (one, other))) {
+        shares[row(one) + number / 4][1].as_mut()[number % 4] = 1.0;
+    }
+}
+
+/// Calls `each` with every patch of a cube and each of its rivals, by their numbers among those near, and how alike and how certain
+/// the rival is.
+#[inline(always)]
+fn each_rival(
+    patches: &[Patch],
+    near: &[(usize, u32)],
+    cube: Range<usize>,
+    mut each: impl FnMut(usize, usize, [f32; 2]),
+) {
+    for one in cube.clone() {
+        let patch = &patches[near[one].0];
+        if patch.has_rival {
+            for other in cube.clone().filter(|&other| other != one) {
+                let rival = &patches[near[other].0];
+                each(one, other, [patch.likeness(rival), rival.certainty()]);
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -287,9 +346,13 @@ mod tests {
         Patch { centre, normal, points: 16, flatness: 1.0, has_rival: false, bend: 0.0 }
     }
 
-    fn evidence(a: &Patch, b: &Patch, step: u32, squarings: usize) -> f32 {
+    fn look(a: &Patch, b: &Patch, step: u32, squarings: usize) -> Told {
         let patches = Patches { all: vec![*b], first: vec![0, 1] };
-        Four::of(&patches, &[(0, step)]).evidence(a, squarings).x
+        Four::of(&patches, &[(0, step)]).look(a, squarings)
+    }
+
+    fn evidence(a: &Patch, b: &Patch, step: u32, squarings: usize) -> f32 {
+        look(a, b, step, squarings).evidence.x
     }
 
     #[test]
@@ -319,12 +382,21 @@ mod tests {
     #[test]
     fn a_sheet_goes_on_in_one_sheet() {
         let near = |height: f32| Patch { has_rival: true, ..patch(Vec3::new(0.0, 0.0, height), Vec3::Z) };
-        let (a, others) = (near(0.0), [near(0.0), near(0.1), patch(Vec3::ZERO, Vec3::X)]);
-        let shares = others.each_ref().map(|b| share(&a, b, &others, Vec3::X));
-        assert_eq!([shares[0], shares[2]], [1.0, 1.0]);
-        assert!(shares[1] < 0.1, "{shares:?}");
+        let patches = [near(0.0), near(0.0), near(0.1), patch(Vec3::ZERO, Vec3::X)];
+        let (own, next) = (Places::NEAR_CENTRE, Places::NEAR_CENTRE + 1);
+        let shares_of = |near: &[(usize, u32)]| {
+            let all = Patches { all: patches.to_vec(), first: vec![0, 1, 4] };
+            let told: Vec<Told> = near.chunks(4).map(|near| Four::of(&all, near).look(&patches[0], 5)).collect();
+            let mut shares = vec![[Vec4::ONE; 2]; told.len()];
+            share(&patches, near, &told, &mut shares);
+            assert!(shares.iter().all(|share| share[1] == Vec4::ONE));
+            shares[0][0].to_array()
+        };
+        let shares = shares_of(&[(0, own), (1, next), (2, next), (3, next)]);
+        assert_eq!([shares[0], shares[1], shares[3]], [1.0; 3]);
+        assert!(shares[2] < 0.1, "{shares:?}");
         // Alone it goes on there too.
-        assert_eq!(share(&a, &others[1], &others[1..2], Vec3::X), 1.0);
+        assert_eq!(shares_of(&[(0, own), (2, next)]), [1.0; 4]);
     }
 
     #[test]

@@ -1,12 +1,11 @@
 //! What patches see of each other across the air.
 
-use super::air::{Sights, is_hidden};
+use super::air::{DIRECTIONS, Sights, direction, hidden};
 use super::patches::{Patches, signed};
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::lattice::{BRICK, cube_bit, cube_place};
 use crate::lists::grow;
-use crate::surroundings::STEPS;
 use glam::IVec3;
 
 /// What errors call the memory of all this.
@@ -66,9 +65,11 @@ impl Looks {
                     continue;
                 }
                 let (looker, beside) = (&patches.all[patch], &patches.all[patches.of_cube(cube)]);
-                for direction in STEPS {
-                    let ray = direction.as_vec3().normalize_or_zero();
-                    if ray.dot(signed(is_against, looker.normal)) < AHEAD || is_hidden(looker, beside, direction) {
+                let hidden_to_it = hidden(looker, beside);
+                for number in 0..DIRECTIONS {
+                    let direction = direction(number);
+                    let ray = direction.as_vec3().normalize();
+                    if ray.dot(signed(is_against, looker.normal)) < AHEAD || hidden_to_it >> number & 1 == 1 {
                         continue;
                     }
                     let Some(hit) = rays.first(place, direction) else { continue };
@@ -76,7 +77,8 @@ impl Looks {
                     grow(&mut all, others.len(), WHAT)?;
                     for other in others.clone() {
                         let seen = &patches.all[other];
-                        if !is_hidden(seen, &patches.all[others.clone()], -direction) {
+                        let opposite = DIRECTIONS - 1 - number;
+                        if hidden(seen, &patches.all[others.clone()]) >> opposite & 1 == 0 {
                             let along = -seen.normal.dot(ray) * seen.certainty();
                             all.push(Look { from: patch as u32, is_against, to: other as u32, along });
                         }
@@ -187,7 +189,7 @@ mod tests {
         };
         let mut seen = 0;
         for &from in &cubes {
-            for direction in STEPS.into_iter().filter(|&direction| direction != IVec3::ZERO) {
+            for direction in (0..DIRECTIONS).map(direction) {
                 let mut along = (1..SIDE as i32).map(|distance| from + distance * direction);
                 let beside = cube_at(from + direction).is_some();
                 let expected = along.find_map(cube_at).filter(|_| !beside);

@@ -18,13 +18,13 @@ use super::signs::Signs;
 use super::support::Support;
 use crate::bricks::set_bits;
 use crate::error::Error;
-use crate::lanes::{positive, root, transposed};
+use crate::lanes::{load, positive, root, transposed};
 use crate::lists::grow;
 use crate::parallel::Scatter;
 use crate::points::Points;
 use crate::progress::Stage;
-use crate::surroundings::{Places, Surroundings};
-use glam::{Vec3, Vec4};
+use crate::surroundings::{Places, STEPS, Surroundings};
+use glam::{Vec3, Vec4, Vec4Swizzles};
 
 /// What errors call the memory of all this.
 const WHAT: &str = "the means of normals";
@@ -81,7 +81,7 @@ pub(super) fn average(
     let known: &[Vec3] = normals;
     let found = stage.part(0.0..0.9).collect(grid.blocks.len(), WHAT, &|block| {
         let mut surroundings = Surroundings::new();
-        let (mut near, mut around) = (Near::new(), Vec::new());
+        let (mut near, mut around) = (Near::new(), Around::new());
         let (mut torn, mut means, mut support) = (Vec::new(), Vec::new(), Support::new());
         let (mut looked_at, mut corner, per_edge) = (None, Vec3::ZERO, (1.0 / edge) as f32);
         for (brick, cube, bit) in grid.cubes_in(block) {
@@ -111,10 +111,11 @@ pub(super) fn average(
             let is_much = deviation > MUCH_NOISE;
             let count: usize = places().map(|place| grid.points_of(surroundings.cube(place)).len()).sum();
             around.clear();
-            grow(&mut around, 27, WHAT)?;
             for place in places() {
-                let others = members.of_cube(grid, surroundings.cube(place));
-                around.push(near.cube(place, others.map(|(point, _)| (position(point), known[point])))?);
+                let cube = surroundings.cube(place);
+                let (count, others) = (grid.points_of(cube).len(), members.of_cube(grid, cube));
+                let number = near.cube(place, count, others.map(|(point, _)| (position(point), known[point])))?;
+                around.add(number, &near.cubes[number]);
             }
             grow(&mut means, grid.points_of(cube).len(), WHAT)?;
             for (point, membership) in members.of_cube(grid, cube) {
@@ -122,7 +123,7 @@ pub(super) fn average(
                     continue;
                 }
                 let (place, own) = (position(point), known[point]);
-                let sum = mean(&around, place, SOFT * deviation);
+                let sum = mean(around.reached_from(place).map(|number| &near.cubes[number]), place, SOFT * deviation);
                 let mean = sum.normalize_or(own);
                 let normal = if is_much {
                     mean
@@ -163,13 +164,15 @@ fn deviation<'a>(patches: impl Iterator<Item = &'a Patch>, noise: f32) -> f32 {
 /// What is known of the cubes in and round a brick.
 struct Near {
     cubes: Vec<Cube>,
+    /// The points of one, as [`Cube::of`] takes them.
+    points: Vec<[Vec4; 2]>,
     /// For each place the number of its cube, if that was asked for.
     numbers: [Option<usize>; Places::COUNT],
 }
 
 impl Near {
     fn new() -> Self {
-        Self { cubes: Vec::new(), numbers: [None; Places::COUNT] }
+        Self { cubes: Vec::new(), points: Vec::new(), numbers: [None; Places::COUNT] }
     }
 
     fn clear(&mut self) {
@@ -177,30 +180,83 @@ impl Near {
         self.numbers.fill(None);
     }
 
-    /// The cube at a place, which holds these points: where they are, in edges, and their normals.
-    fn cube(&mut self, place: usize, points: impl Iterator<Item = (Vec3, Vec3)> + Clone) -> Result<Cube, Error> {
+    /// The number of the cube at a place, which holds `count` points: where they are, in edges, and their normals.
+    fn cube(&mut self, place: usize, count: usize, points: impl Iterator<Item = (Vec3, Vec3)>) -> Result<usize, Error> {
         if let Some(number) = self.numbers[place] {
-            return Ok(self.cubes[number]);
+            return Ok(number);
         }
         grow(&mut self.cubes, 1, WHAT)?;
-        self.numbers[place] = Some(self.cubes.len());
-        let cube = Cube::of(points);
-        self.cubes.push(cube);
-        Ok(cube)
+        self.points.clear();
+        grow(&mut self.points, count, WHAT)?;
+        self.points.extend(points.map(|(place, normal)| [place.extend(1.0), normal.extend(0.0)]));
+        let number = self.cubes.len();
+        self.numbers[place] = Some(number);
+        self.cubes.push(Cube::of(&self.points));
+        Ok(number)
+    }
+}
+
+/// The boxes round the points of a cube and of those round it, coordinate by coordinate.
+struct Around {
+    /// The numbers of the cubes in [`Near`].
+    numbers: [usize; Self::ROOM],
+    middle: [[f32; Self::ROOM]; 3],
+    half: [[f32; Self::ROOM]; 3],
+    count: usize,
+    /// The numbers of those that were reached last.
+    reached: [usize; Self::ROOM],
+}
+
+impl Around {
+    /// For 27, four by four.
+    const ROOM: usize = STEPS.len() + 1;
+
+    fn new() -> Self {
+        let room = [0.0; Self::ROOM];
+        Self { numbers: [0; Self::ROOM], middle: [room; 3], half: [room; 3], count: 0, reached: [0; Self::ROOM] }
+    }
+
+    fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    fn add(&mut self, number: usize, cube: &Cube) {
+        self.numbers[self.count] = number;
+        for axis in 0..3 {
+            self.middle[axis][self.count] = cube.middle[axis];
+            self.half[axis][self.count] = cube.half[axis];
+        }
+        self.count += 1;
+    }
+
+    /// The numbers of the cubes whose boxes lie within an edge of a position. Without a jump for each: nothing foretells which do.
+    fn reached_from(&mut self, position: Vec3) -> impl Iterator<Item = usize> {
+        let here = position.to_array().map(Vec4::splat);
+        let mut count = 0;
+        for first in (0..self.count).step_by(4) {
+            let [x, y, z] = [0, 1, 2].map(|axis| {
+                let (middle, half) = (load(&self.middle[axis][first..]), load(&self.half[axis][first..]));
+                positive((here[axis] - middle).abs() - half)
+            });
+            let is_near = (x * x + y * y + z * z).cmplt(Vec4::ONE).bitmask();
+            for lane in 0..4 {
+                self.reached[count] = self.numbers[first + lane];
+                count += usize::from(is_near >> lane & 1 == 1 && first + lane < self.count);
+            }
+        }
+        self.reached[..count].iter().copied()
     }
 }
 
 /// The points of a cube with their normals, those of one octant of the box round them together.
-#[derive(Clone, Copy)]
 struct Cube {
     /// The middle of the box, and half of its sides.
-    middle: Vec4,
-    half: Vec4,
+    middle: Vec3,
+    half: Vec3,
     octants: [Octants; 2],
 }
 
 /// Four octants.
-#[derive(Clone, Copy)]
 struct Octants {
     /// The mean positions.
     places: [Vec4; 3],
@@ -211,44 +267,44 @@ struct Octants {
 }
 
 impl Cube {
-    fn of(points: impl Iterator<Item = (Vec3, Vec3)> + Clone) -> Self {
-        let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
-        for (position, _) in points.clone() {
-            (low, high) = (low.min(position), high.max(position));
+    /// Of points: where each is, and 1, and its normal.
+    fn of(points: &[[Vec4; 2]]) -> Self {
+        let (mut low, mut high) = (Vec4::MAX, Vec4::MIN);
+        for &[place, _] in points {
+            low = Vec4::select(place.cmplt(low), place, low);
+            high = Vec4::select(place.cmpgt(high), place, high);
         }
-        let [middle, half] = [low + high, high - low].map(|sum| 0.5 * sum);
-        let mut sums = [(Vec3::ZERO, Vec3::ZERO, 0.0); 8];
-        for (position, normal) in points {
-            let (place, along, count) = &mut sums[position.cmpge(middle).bitmask() as usize];
-            *place += position - middle;
-            *along += normal;
-            *count += 1.0;
+        let [middle, half] = [low + high, high - low].map(|sum| (0.5 * sum).with_w(0.0));
+        let mut sums = [[Vec4::ZERO; 2]; 8];
+        for &[place, along] in points {
+            let sums = &mut sums[place.cmpge(middle).bitmask() as usize & 7];
+            // And how many there are.
+            sums[0] += place - middle;
+            sums[1] += along;
         }
         let octants = [0, 4].map(|first| {
-            let four: [_; 4] = std::array::from_fn(|i| sums[first + i]);
+            let rows = |sum: usize| transposed(std::array::from_fn(|i| sums[first + i][sum]));
+            let ([x, y, z, counts], [along_x, along_y, along_z, _]) = (rows(0), rows(1));
             // Where there is none, beyond any reach.
-            let mean = |place: Vec3, count: f32| if count > 0.0 { middle + place / count } else { Vec3::splat(FAR) };
-            let [x, y, z, _] = transposed(four.map(|(place, _, count)| mean(place, count).extend(0.0)));
-            let [along_x, along_y, along_z, counts] = transposed(four.map(|(_, along, count)| along.extend(count)));
-            Octants { places: [x, y, z], along: [along_x, along_y, along_z], counts }
+            let mean = |sums: Vec4, middle: f32| {
+                Vec4::select(counts.cmpgt(Vec4::ZERO), middle + sums / counts, Vec4::splat(FAR))
+            };
+            let places = [mean(x, middle.x), mean(y, middle.y), mean(z, middle.z)];
+            Octants { places, along: [along_x, along_y, along_z], counts }
         });
-        Self { middle: middle.extend(0.0), half: half.extend(0.0), octants }
+        Self { middle: middle.xyz(), half: half.xyz(), octants }
     }
 }
 
 /// What the normals within an edge say of a position, the nearer the more: the mean of their fields as dipoles, which are as
 /// smooth as if each were `soft` beside the position. The more they contradict each other, the shorter it is.
-fn mean(cubes: &[Cube], position: Vec3, soft: f32) -> Vec3 {
+fn mean<'a>(cubes: impl Iterator<Item = &'a Cube>, position: Vec3, soft: f32) -> Vec3 {
     let dot = |[ax, ay, az]: [Vec4; 3], [bx, by, bz]: [Vec4; 3]| ax * bx + ay * by + az * bz;
-    let here = position.extend(0.0);
     let [x, y, z] = position.to_array().map(Vec4::splat);
     let soft = Vec4::splat(soft * soft);
     let (mut sums, mut total) = ([Vec4::ZERO; 3], Vec4::ZERO);
-    for Cube { middle, half, octants } in cubes {
-        if positive((here - *middle).abs() - *half).length_squared() >= 1.0 {
-            continue;
-        }
-        for Octants { places: [other_x, other_y, other_z], along, counts } in octants {
+    for cube in cubes {
+        for Octants { places: [other_x, other_y, other_z], along, counts } in &cube.octants {
             let apart = [*other_x - x, *other_y - y, *other_z - z];
             let square = dot(apart, apart);
             let scale = Vec4::ONE / (square + soft);
@@ -272,11 +328,12 @@ mod tests {
     fn both_sides_of_a_wall_agree_on_its_rim() {
         let sides = [0.1, -0.1].map(|z| {
             let points = (0..100).map(move |i| Vec3::new(-0.05 * (i % 10) as f32, 0.1 * (i / 10) as f32 - 0.45, z));
-            Cube::of(points.map(move |place| (place, Vec3::Z * z.signum())))
+            let points: Vec<[Vec4; 2]> = points.map(|place| [place.extend(1.0), Vec4::Z * z.signum()]).collect();
+            Cube::of(&points)
         });
-        let rim = mean(&sides, Vec3::ZERO, 0.4);
+        let rim = mean(sides.iter(), Vec3::ZERO, 0.4);
         assert!(rim.normalize().x > 0.99, "{rim}");
-        let outside = mean(&sides[..1], Vec3::new(-0.2, 0.0, 0.2), 0.4);
+        let outside = mean(sides[..1].iter(), Vec3::new(-0.2, 0.0, 0.2), 0.4);
         assert!(outside.normalize().z > 0.95, "{outside}");
     }
 }

@@ -1,9 +1,10 @@
 //! The points of a cube, parted into those that lie on one piece of surface.
 
 use super::sheets::{self, Doubt};
+use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::{Grid, Placed, located};
-use crate::lanes::transposed;
+use crate::lanes::{root, transposed};
 use crate::lattice::{BRICK, cube_centre};
 use crate::lists::{concatenated, grow, reserve, starts};
 use crate::order::sort_few;
@@ -243,51 +244,21 @@ fn split(
             order.push((key(point.local), i as u32));
         }
     }
-    sort_few(order);
+    // The first bits of the key are those of x.
+    sort_few(order, |(key, _)| (key >> 42) as f32);
     // From here on the number of each one's patch in place of its key.
+    let mut sums = Sums::NONE;
     for (number_or_key, i) in &mut *order {
         let i = *i as usize;
-        let (place, normal) = (points[i].local - centre, normals[i]);
-        let own = &patches[first..];
-        let misfit = |patch: &Patch| misfit(patch, place, normal, limits);
-        let fits = own.iter().enumerate().filter_map(|(number, patch)| Some((number, misfit(patch)?)));
-        let mut best = fits.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(number, _)| number);
-        if best.is_none() && own.len() == MOST {
-            let distance = |patch: &Patch| (patch.centre / patch.points as f32).distance_squared(place);
-            best = (0..MOST).min_by(|&a, &b| distance(&own[a]).total_cmp(&distance(&own[b])));
-        }
-        let number = best.unwrap_or(own.len());
-        if number == own.len() {
-            patches.push(Patch {
-                centre: Vec3::ZERO,
-                normal: Vec3::ZERO,
-                points: 0,
-                flatness: 0.0,
-                has_rival: false,
-                bend: 0.0,
-            });
-        }
-        // Sums until all are in.
-        let patch = &mut patches[first + number];
-        let is_opposite = patch.normal.dot(normal) < 0.0;
-        patch.centre += place;
-        patch.normal += aligned(normal, patch.normal);
-        patch.points += 1;
+        let (number, is_opposite) = sums.add(points[i].local - centre, normals[i], limits);
         of_point[i].write(Membership::new(number, is_opposite));
         *number_or_key = number as u64;
     }
-    if limits.is_exact && patches.len() == first + 1 {
-        let one = patches.pop();
-        if part(points, normals, centre, limits, patches, of_point) {
-            return;
-        }
-        patches.extend(one);
+    if limits.is_exact && sums.count == 1 && part(points, normals, centre, limits, patches, of_point) {
+        return;
     }
+    patches.extend((0..sums.count).map(|number| sums.patch(number)));
     let own = &mut patches[first..];
-    for patch in &mut *own {
-        patch.centre /= patch.points as f32;
-        patch.normal = patch.normal.normalize_or(Vec3::Z);
-    }
     for &(number, i) in &*order {
         let patch = &mut own[number as usize];
         let off = (points[i as usize].local - centre - patch.centre).dot(patch.normal);
@@ -400,21 +371,117 @@ pub(super) fn signed<T: Neg<Output = T>>(is_flipped: bool, one: T) -> T {
     if is_flipped { -one } else { one }
 }
 
+/// The same for a number, without a jump: nothing foretells who is flipped.
+#[inline(always)]
+pub(super) fn turned(is_flipped: bool, one: f32) -> f32 {
+    f32::from_bits(one.to_bits() ^ u32::from(is_flipped) << 31)
+}
+
 /// Orders places in a brick by x, then y, then z. Numbers that are not negative have their bits in their order.
 fn key(place: Vec3) -> u64 {
     let [x, y, z] = place.to_array().map(|coordinate| u64::from(coordinate.to_bits() >> 10));
     x << 42 | y << 21 | z
 }
 
-/// How badly a point fits a patch of sums; `None` if it is none of its.
-#[inline(always)]
-fn misfit(patch: &Patch, place: Vec3, normal: Vec3, limits: Limits) -> Option<f32> {
-    let (square, along) = (patch.normal.length_squared(), patch.normal.dot(normal).abs());
-    if along * along < limits.cosine_squared * square {
-        return None;
+/// Sums over the points of some patches.
+struct Sums {
+    count: usize,
+    fours: [FourSums; MOST / 4],
+}
+
+/// Those of four patches, number for number in lanes.
+#[derive(Clone, Copy)]
+struct FourSums {
+    centre: [Vec4; 3],
+    normal: [Vec4; 3],
+    points: Vec4,
+}
+
+impl Sums {
+    const NONE: Self = {
+        let four = FourSums { centre: [Vec4::ZERO; 3], normal: [Vec4::ZERO; 3], points: Vec4::ZERO };
+        Self { count: 0, fours: [four; MOST / 4] }
+    };
+
+    /// Adds a point to the patch that it fits best, or to a new one if there is none and they are not too many. Answers which that
+    /// is, and whether its normal is opposite.
+    fn add(&mut self, place: Vec3, normal: Vec3, limits: Limits) -> (usize, bool) {
+        let (number, is_opposite) = match self.best(place, normal, limits) {
+            Some(best) => best,
+            None if self.count == MOST => {
+                let nearest = self.nearest(place);
+                (nearest, self.normal(nearest).dot(normal) < 0.0)
+            }
+            None => {
+                self.count += 1;
+                (self.count - 1, false)
+            }
+        };
+        let four = &mut self.fours[number / 4];
+        // All four at once: what was stored one by one would be waited for.
+        let lane = Vec4::AXES[number % 4];
+        let normal = signed(is_opposite, normal);
+        for axis in 0..3 {
+            four.centre[axis] += place[axis] * lane;
+            four.normal[axis] += normal[axis] * lane;
+        }
+        four.points += lane;
+        (number, is_opposite)
     }
-    let apart = place - patch.centre / patch.points as f32;
-    let length = square.sqrt();
-    let off = (apart.dot(patch.normal).abs() / length).min(apart.dot(normal).abs());
-    (off < limits.thickness).then(|| 1.0 - along / length + off)
+
+    /// The patch that a point fits best, if any, and whether its normal is opposite.
+    fn best(&self, place: Vec3, normal: Vec3, limits: Limits) -> Option<(usize, bool)> {
+        let dot = |[ax, ay, az]: [Vec4; 3], [bx, by, bz]: [Vec4; 3]| ax * bx + ay * by + az * bz;
+        let [place, own] = [place, normal].map(|one| one.to_array().map(Vec4::splat));
+        let (mut best, mut least) = (None, f32::INFINITY);
+        for (four, &FourSums { centre, normal, points }) in self.fours[..self.count.div_ceil(4)].iter().enumerate() {
+            let (square, along) = (dot(normal, normal), dot(normal, own));
+            let apart = [0, 1, 2].map(|axis| place[axis] - centre[axis] / points);
+            let length = root(square);
+            let (off, off_own) = (dot(apart, normal).abs() / length, dot(apart, own).abs());
+            let off = Vec4::select(off.cmplt(off_own), off, off_own);
+            let misfit = (1.0 - along.abs() / length + off).to_array();
+            let is_alike = (along * along).cmpge(limits.cosine_squared * square);
+            // Where there is none nothing is a number, and none fits.
+            let fits = (is_alike & off.cmplt(Vec4::splat(limits.thickness))).bitmask();
+            let is_opposite = along.cmplt(Vec4::ZERO).bitmask();
+            for lane in set_bits(fits.into()) {
+                if misfit[lane as usize] < least {
+                    (best, least) =
+                        (Some((4 * four + lane as usize, is_opposite >> lane & 1 == 1)), misfit[lane as usize]);
+                }
+            }
+        }
+        best
+    }
+
+    /// The patch whose centre is nearest to a place.
+    fn nearest(&self, place: Vec3) -> usize {
+        let distance = |&number: &usize| self.centre(number).distance_squared(place);
+        (0..self.count).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+    }
+
+    fn centre(&self, number: usize) -> Vec3 {
+        Vec3::from_array(self.fours[number / 4].centre.map(|lanes| lanes[number % 4])) / self.points(number)
+    }
+
+    fn normal(&self, number: usize) -> Vec3 {
+        Vec3::from_array(self.fours[number / 4].normal.map(|lanes| lanes[number % 4]))
+    }
+
+    fn points(&self, number: usize) -> f32 {
+        self.fours[number / 4].points[number % 4]
+    }
+
+    /// The patch itself, but for how its points lie.
+    fn patch(&self, number: usize) -> Patch {
+        Patch {
+            centre: self.centre(number),
+            normal: self.normal(number).normalize_or(Vec3::Z),
+            points: self.points(number) as u32,
+            flatness: 0.0,
+            has_rival: false,
+            bend: 0.0,
+        }
+    }
 }
