@@ -62,9 +62,10 @@ const SOME: usize = 512;
 fn sort_roughly<T: Copy>(list: &mut [T], height: impl Fn(T) -> f32) {
     let bounds = |(low, high): (f32, f32), &one: &T| (height(one).min(low), height(one).max(high));
     let (low, high) = list.iter().fold((f32::INFINITY, f32::NEG_INFINITY), bounds);
-    let scale = (list.len() - 1) as f32 / (high - low);
-    // Not a number if all are at one height, and then 0.
-    let part = |one: T| ((height(one) - low) * scale) as usize % SOME;
+    let last = list.len() - 1;
+    let scale = last as f32 / (high - low);
+    // If all are at one height, or so near to it that the scale is infinite, not a number, which becomes 0, or too large.
+    let part = |one: T| (((height(one) - low) * scale) as usize).min(last);
     let (mut next, mut total, mut sorted) = ([0u16; SOME], 0, [list[0]; SOME]);
     list.iter().for_each(|&one| next[part(one)] += 1);
     next[..list.len()].iter_mut().for_each(|next| total += std::mem::replace(next, total));
@@ -123,6 +124,12 @@ mod tests {
             let mut expected = list.clone();
             expected.sort_unstable();
             sort_few(&mut list, |one| one as f32);
+            assert_eq!(list, expected);
+            // So near to each other that nothing tells how far.
+            let mut list: Vec<f32> = (0..length).map(|i| f32::from_bits(i.wrapping_mul(0x9E37_79B9) % 3)).collect();
+            let mut expected = list.clone();
+            expected.sort_unstable_by(f32::total_cmp);
+            sort_few(&mut list, |one| one);
             assert_eq!(list, expected);
         }
     }
