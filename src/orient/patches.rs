@@ -386,6 +386,8 @@ fn key(place: Vec3) -> u64 {
 /// Sums over the points of some patches.
 struct Sums {
     count: usize,
+    /// How many points each has: single precision counts by ones to 2^24 only.
+    points: [u32; MOST],
     fours: [FourSums; MOST / 4],
 }
 
@@ -400,7 +402,7 @@ struct FourSums {
 impl Sums {
     const NONE: Self = {
         let four = FourSums { centre: [Vec4::ZERO; 3], normal: [Vec4::ZERO; 3], points: Vec4::ZERO };
-        Self { count: 0, fours: [four; MOST / 4] }
+        Self { count: 0, points: [0; MOST], fours: [four; MOST / 4] }
     };
 
     /// Adds a point to the patch that it fits best, or to a new one if there is none and they are not too many. Answers which that
@@ -426,6 +428,7 @@ impl Sums {
             four.normal[axis] += normal[axis] * lane;
         }
         four.points += lane;
+        self.points[number] += 1;
         (number, is_opposite)
     }
 
@@ -462,15 +465,11 @@ impl Sums {
     }
 
     fn centre(&self, number: usize) -> Vec3 {
-        Vec3::from_array(self.fours[number / 4].centre.map(|lanes| lanes[number % 4])) / self.points(number)
+        Vec3::from_array(self.fours[number / 4].centre.map(|lanes| lanes[number % 4])) / self.points[number] as f32
     }
 
     fn normal(&self, number: usize) -> Vec3 {
         Vec3::from_array(self.fours[number / 4].normal.map(|lanes| lanes[number % 4]))
-    }
-
-    fn points(&self, number: usize) -> f32 {
-        self.fours[number / 4].points[number % 4]
     }
 
     /// The patch itself, but for how its points lie.
@@ -478,7 +477,7 @@ impl Sums {
         Patch {
             centre: self.centre(number),
             normal: self.normal(number).normalize_or(Vec3::Z),
-            points: self.points(number) as u32,
+            points: self.points[number],
             flatness: 0.0,
             has_rival: false,
             bend: 0.0,
