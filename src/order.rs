@@ -40,10 +40,11 @@ pub(crate) fn sort(numbers: &mut Vec<i64>) {
     }
 }
 
-/// Sorts a list without NaN: by insertion if it is short, and then nothing is faster; if it is not so short after what `height`
-/// tells of each, which must be in the same order, was made its place among all, as if that were evenly spread.
+/// Sorts a list without NaN by insertion, and of short ones nothing is faster; if it is longer, after each has a rough place by its
+/// `height`, which must be in the same order: among that of all, as if they were evenly spread.
 pub(crate) fn sort_few<T: Copy + PartialOrd>(list: &mut [T], height: impl Fn(T) -> f32) {
     const FEW: usize = 32;
+    // Without signs hardly a list is longer, and the sort by parts is left out of the module then.
     if list.len() > SOME || list.len() > FEW && !cfg!(feature = "full") {
         list.sort_unstable_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
         return;

@@ -801,6 +801,12 @@ test('a flip turns what is saved, again undoes it, and curvature keeps it', asyn
   for (let presses = 1; presses <= 4; presses++) await page.keyboard.press('Control+z');
   assert.equal(await flip.getAttribute('aria-pressed'), 'false');
   assert.ok(!(await backs.isChecked()), 'the flip had switched it on');
+
+  // What is computed anew is as its orientation promises.
+  await flip.click();
+  const { saved: anew } = await oriented('Outward');
+  assert.deepEqual(anew, before);
+  assert.equal(await flip.getAttribute('aria-pressed'), 'false');
 });
 
 test('flips that a new result or another file takes away can be brought back', async () => {
