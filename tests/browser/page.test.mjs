@@ -193,6 +193,7 @@ test('of several files the first scan is taken, and folders are refused', async 
   assert.ok(await note.isHidden());
   // Without a scan among them, what is there stays.
   await drop(page, 'notes.txt', Buffer.alloc(0), { after: ['photo.jpg'] });
+  await page.getByRole('alert').filter({ hasText: 'notes.txt' }).waitFor();
   assert.match((await result(page, 'first.ply')).error, /^notes\.txt is empty/);
   // As a browser tells a folder, which cannot be made in a test.
   await page.evaluate(() => (DataTransferItem.prototype.webkitGetAsEntry = () => ({ isDirectory: true })));
