@@ -1,7 +1,7 @@
 // npm run orientation [-- --meshes FOLDER] [--out FOLDER] [--rows NAME,...] [--peers]: how many signs are right on shapes whose
 // sides are known, on points sampled on the meshes of a folder, and on its range scans, as docs/orientation-bench.md. With
 // --rows only those of these names, variants or both ("cube", "clean", "cube-clean"): printed, and not written. With --peers
-// Open3D and MeshLib choose signs too, of the same clouds in the same run, in a Python environment in .tools: half an hour.
+// Open3D, MeshLib, CGAL and VTK choose signs too, of the same clouds in the same run, in a Python in .tools: an hour.
 
 import { existsSync, mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';

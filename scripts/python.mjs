@@ -7,6 +7,8 @@ import { Failure, output, root, run, tell, tools } from './run.mjs';
 const folder = join(tools, 'python');
 /** What pip does not bring. */
 const OF_THE_SYSTEM = 'libegl1, libgl1, libusb-1.0-0 and libx11-6';
+/** What the benches import. */
+const MODULES = 'meshlib.mrmeshpy, open3d, small_gicp, CGAL.CGAL_Point_set_processing_3, vtkmodules.vtkFiltersPoints';
 const inFolder = (name) =>
   process.platform === 'win32' ? join(folder, 'Scripts', `${name}.exe`) : join(folder, 'bin', name);
 
@@ -23,7 +25,7 @@ export function setupPython() {
   run(python, ['-m', 'pip', 'install', '--quiet', '--disable-pip-version-check', '--requirement', wanted]);
   // Otherwise a peer that can't be loaded would look like one that fails at every cloud.
   try {
-    run(python, ['-c', 'import meshlib.mrmeshpy, open3d, small_gicp'], { quiet: true });
+    run(python, ['-c', `import ${MODULES}`], { quiet: true });
   } catch {
     throw new Failure(`a peer can't be loaded, see above; Open3D needs ${OF_THE_SYSTEM} (names in Debian)`);
   }

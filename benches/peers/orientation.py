@@ -1,10 +1,11 @@
-"""Signs by Open3D and MeshLib on one cloud of the orientation bench, for its --peers.
+"""Signs by Open3D, MeshLib, CGAL and VTK on one cloud of the orientation bench, for its --peers.
 
     python benches/peers/orientation.py CLOUD
 
 CLOUD is a PLY file with true normals. One line for each method, in JSON: the share of right signs up to one flip of all, and
 the seconds on one thread, with the normals. Open3D estimates from 30 neighbours and orients along the tangent planes of 15
-or 30 (Hoppe 1992); MeshLib does both within the radius that holds 48 or 150 points. What takes longer than LIMIT, or fails,
+or 30 (Hoppe 1992); MeshLib does both within the radius that holds 48 or 150 points; CGAL does from 18 or 30 neighbours, and
+along a spanning tree of these; VTK from 16 or 30, and from point to point among them. What takes longer than LIMIT, or fails,
 has no share.
 """
 
@@ -40,11 +41,55 @@ def meshlib_normals(positions, points):
     return [(normal.x, normal.y, normal.z) for normal in normals.vec], seconds
 
 
+def cgal_normals(positions, neighbours):
+    from CGAL.CGAL_Kernel import Point_3
+    from CGAL.CGAL_Point_set_3 import Point_set_3
+    from CGAL.CGAL_Point_set_processing_3 import mst_orient_normals, pca_estimate_normals
+    import numpy
+
+    cloud = Point_set_3()
+    cloud.add_normal_map()
+    for position in positions.tolist():
+        cloud.insert(Point_3(*position))
+    start = time.perf_counter()
+    pca_estimate_normals(cloud, neighbours)
+    mst_orient_normals(cloud, neighbours)
+    seconds = time.perf_counter() - start
+    normals = numpy.zeros_like(positions)
+    # Points that the tree does not reach have moved to the end, but an index stays with its point.
+    for index in cloud.indices():
+        normal = cloud.normal(index)
+        normals[index] = normal.x(), normal.y(), normal.z()
+    return normals, seconds
+
+
+def vtk_normals(positions, neighbours):
+    from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkPolyData
+    from vtkmodules.vtkFiltersPoints import vtkPCANormalEstimation
+
+    points, cloud, estimation = vtkPoints(), vtkPolyData(), vtkPCANormalEstimation()
+    points.SetData(numpy_to_vtk(positions))
+    cloud.SetPoints(points)
+    estimation.SetInputData(cloud)
+    estimation.SetSampleSize(neighbours)
+    estimation.SetNormalOrientationToGraphTraversal()
+    start = time.perf_counter()
+    estimation.Update()
+    seconds = time.perf_counter() - start
+    return vtk_to_numpy(estimation.GetOutput().GetPointData().GetNormals()), seconds
+
+
 METHODS = {
     "Open3D, 15": (open3d_normals, 15),
     "Open3D, 30": (open3d_normals, 30),
     "MeshLib, 48": (meshlib_normals, 48),
     "MeshLib, 150": (meshlib_normals, 150),
+    "CGAL, 18": (cgal_normals, 18),
+    "CGAL, 30": (cgal_normals, 30),
+    "VTK, 16": (vtk_normals, 16),
+    "VTK, 30": (vtk_normals, 30),
 }
 
 
