@@ -113,8 +113,8 @@ async function show({ estimator, page }, positions, variant, view) {
   if (closer) await page.mouse.wheel(0, (100 * Math.log(closer)) / Math.log(0.95));
   // A view in motion is drawn in part.
   if (turn || closer) await page.waitForTimeout(1500);
-  // Till a large cloud is whole, another canvas covers it.
-  await page.waitForFunction(() => document.querySelector('canvas + canvas').hidden);
+  // Till a large cloud is whole, what was drawn in motion is shown.
+  await page.locator('canvas[aria-busy=false]').waitFor();
 }
 
 function turnUpwards(normals) {

@@ -1123,7 +1123,8 @@ test('a large cloud is drawn by many frames, until it is whole', async () => {
       window.draws = [];
       const { drawArrays } = WebGL2RenderingContext.prototype;
       WebGL2RenderingContext.prototype.drawArrays = function (mode, first, count) {
-        window.draws.push({ first, end: first + count, covered: !document.querySelector('.cover').hidden });
+        const isShown = this.getParameter(this.FRAMEBUFFER_BINDING) === null;
+        window.draws.push({ isOfPoints: mode === this.POINTS, isShown, first, end: first + count });
         drawArrays.call(this, mode, first, count);
       };
     },
@@ -1136,10 +1137,12 @@ test('a large cloud is drawn by many frames, until it is whole', async () => {
     document.querySelector('[data-do=flip]').click();
     return new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
   });
-  await page.waitForFunction(() => document.querySelector('.cover').hidden);
+  await page.locator('#canvas[aria-busy=false]').waitFor();
   const draws = await page.evaluate(() => window.draws);
-  const last = draws.slice(draws.findLastIndex(({ first }) => first === 0));
-  assert.ok(last.length > 1 && last.every(({ covered }) => covered), JSON.stringify(last));
+  const last = draws.slice(draws.findLastIndex(({ isOfPoints, first }) => isOfPoints && first === 0));
+  const whole = last.pop();
+  assert.ok(whole.isShown && !whole.isOfPoints, JSON.stringify(whole));
+  assert.ok(last.length > 1 && last.every(({ isShown }) => !isShown), JSON.stringify(last));
   for (const [i, { first, end }] of last.entries()) assert.equal(end, last[i + 1]?.first ?? points, `from ${first}`);
   assert.ok((await backsShown(page)) > 0.9);
 });

@@ -14,6 +14,7 @@ import {
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { createPointMaterial, type Shading as MaterialShading } from 'bilinormal/three';
 import type { Bounds } from './bounds';
+import { createPicture } from './eyedome';
 import { pickPoint } from './pick';
 import { spacingOf } from './spacing';
 import { spread } from './spread';
@@ -79,23 +80,15 @@ const SLOW_FRAME = 36;
 const STILL = 140;
 /** Points without order need this many times the spacing of an even pattern to close a surface. */
 const CLOSING = 2.8;
+/** Least that a point measures, in pixels of the page. */
+const LEAST_PIXELS = 1.5;
 /** Most that a point measures without a choice of its size, where the bulk of the cloud has radius 1: a few are dots. */
 const LARGEST = 0.2;
 
 export function createViewer(canvas: HTMLCanvasElement): Viewer {
   const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
-  const renderer = new WebGLRenderer({
-    canvas,
-    alpha: true,
-    antialias: false,
-    powerPreference: 'high-performance',
-    // A large cloud is added to the frame before, until it is whole.
-    preserveDrawingBuffer: true,
-  });
-  const cover = document.createElement('canvas');
-  cover.className = 'cover';
-  cover.hidden = true;
-  canvas.after(cover);
+  const renderer = new WebGLRenderer({ canvas, alpha: true, antialias: false, powerPreference: 'high-performance' });
+  const picture = createPicture(renderer);
   const camera = new PerspectiveCamera(38, 1, 0.01, 100);
   camera.position.set(0, 0, 3);
   const controls = new OrbitControls(camera, canvas);
@@ -110,7 +103,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   const turned = new Group();
   scene.add(turned);
   // Warm and with little light on edges, so that form stands out against both backgrounds.
-  const material = createPointMaterial({ color: '#ebe2d3', ambient: 0.02, pixels: 1.5 });
+  const material = createPointMaterial({ color: '#ebe2d3', ambient: 0.02 });
   const points = new Points(new BufferGeometry(), material);
   // Bounds come from finite points only; three's own would turn into NaN.
   points.frustumCulled = false;
@@ -147,6 +140,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   /** Draws anew. */
   function request(): void {
     filled = 0;
+    canvas.ariaBusy = 'true';
     proceed();
   }
 
@@ -165,17 +159,22 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     lastFrame = now;
     setDepthRange();
     if (!moving) return fill(elapsed);
-    cover.hidden = true;
     drawPart(affordable);
     request();
   }
 
   function drawPart(most: number): void {
     setSize(thinOut(most));
-    renderer.render(scene, camera);
+    picture.add(scene, camera, true);
+    show();
   }
 
-  /** Draws the next points of a still cloud. Until it is whole, what is drawn in motion lies over it. */
+  function show(): void {
+    // Colours that stand for something stay what they are.
+    picture.show(camera, shading !== 'normals' && shading !== 'curvature', material.size);
+  }
+
+  /** Draws the next points of a still cloud. Until it is whole, what is drawn in motion stays on the canvas. */
   function fill(elapsed: number): void {
     const all = cloud ? cloud.positions.length / 3 : 0;
     const isLarge = all > SPARSE_MOST;
@@ -186,21 +185,16 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
       // Or it would begin again, for less than can be seen.
       lastMove = -Infinity;
       drawPart(Math.min(affordable, filling));
-      cover.width = canvas.width;
-      cover.height = canvas.height;
-      cover.getContext('2d')!.drawImage(canvas, 0, 0);
-      cover.hidden = false;
     }
     points.geometry = whole;
     setSize(1);
     const some = isLarge ? filling : all;
     whole.setDrawRange(filled, some);
-    renderer.autoClear = filled === 0;
-    renderer.render(scene, camera);
-    renderer.autoClear = true;
+    picture.add(scene, camera, filled === 0);
     filled += some;
-    if (filled < all) proceed();
-    else cover.hidden = true;
+    if (filled < all) return proceed();
+    show();
+    canvas.ariaBusy = 'false';
   }
 
   /** Learns from the time since the last frame how many points this machine draws smoothly. */
@@ -332,8 +326,11 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   function resize(): void {
     const { clientWidth: width, clientHeight: height } = canvas;
     if (width === 0 || height === 0) return;
-    renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    const ratio = Math.min(devicePixelRatio, 2);
+    renderer.setPixelRatio(ratio);
     renderer.setSize(width, height, false);
+    picture.setSize(canvas.width, canvas.height, ratio);
+    material.pixels = LEAST_PIXELS * ratio;
     // Five degrees for a press of a key, whatever the size of the window.
     controls.keyRotateSpeed = height / 72;
     reframe();

@@ -1,0 +1,133 @@
+// Eye-dome lighting: what lies behind the edge of something nearer is darker there, as if light came from the eye and did
+// not reach round edges. So leaves, walls and limbs stand out from each other whatever their normals, and before these
+// are known. After Boucheny and Ribes, "Eye-Dome Lighting: a non-photorealistic shading technique", Kitware Source 17
+// (2011).
+import {
+  DepthTexture,
+  HalfFloatType,
+  NearestFilter,
+  ShaderMaterial,
+  UnsignedByteType,
+  Vector2,
+  WebGLRenderTarget,
+  type PerspectiveCamera,
+  type Scene,
+  type WebGLRenderer,
+} from 'three';
+import { FullScreenQuad } from 'three/examples/jsm/postprocessing/Pass.js';
+
+/** A picture that grows out of sight, and is then put on the canvas. */
+export interface Picture {
+  /** In pixels of the screen, of which there are `ratio` to one of the page. */
+  setSize(width: number, height: number, ratio: number): void;
+  /** Draws the scene into the picture, over what it has, or if it begins `anew` alone. */
+  add(scene: Scene, camera: PerspectiveCamera, anew: boolean): void;
+  /** Puts it on the canvas; with eye-dome lighting if the points are `lit`, which have a diameter in the world. */
+  show(camera: PerspectiveCamera, lit: boolean, diameter: number): void;
+}
+
+/** How much darker it gets: so many octaves for each octave that a place is farther away than those round it. */
+const STRENGTH = 200;
+/** What is darkest still has this much of its light. */
+const LEAST = 0.3;
+/** How far away, in pixels of the page, places are looked at. */
+const REACH = 1.5;
+/** Points are discs across the view, so that those of one surface lie as far behind each other, in diameters. */
+const THICKNESS = 0.5;
+
+const vertexShader = /* glsl */ `
+varying vec2 place;
+void main() {
+  place = uv;
+  gl_Position = vec4(position.xy, 0.0, 1.0);
+}
+`;
+
+const fragmentShader = /* glsl */ `
+uniform sampler2D picture;
+uniform sampler2D depths;
+uniform vec2 reach;
+uniform float near;
+uniform float far;
+uniform float strength;
+uniform float thickness;
+varying vec2 place;
+
+// In octaves, so that the same step is as dark from afar.
+float away(float depth) {
+  return log2(near * far / (far - depth * (far - near)));
+}
+
+// How much nearer another place is. Where nothing is, that tells nothing.
+float nearer(vec2 at, float own) {
+  float depth = texture2D(depths, at).x;
+  return depth == 1.0 ? 0.0 : own - away(depth);
+}
+
+void main() {
+  vec4 shown = texture2D(picture, place);
+  if (strength > 0.0 && shown.a > 0.0) {
+    float own = away(texture2D(depths, place).x);
+    float behind = 0.0;
+    float same = thickness * exp2(-own);
+    for (int i = 0; i < 4; i++) {
+      float turn = float(i) * 0.7853982;
+      vec2 step = reach * vec2(cos(turn), sin(turn));
+      behind += max(0.0, nearer(place + step, own) + nearer(place - step, own) - same);
+    }
+    shown.rgb *= mix(${LEAST}, 1.0, exp2(-strength * behind / 8.0));
+  }
+  gl_FragColor = shown;
+  #include <colorspace_fragment>
+}
+`;
+
+export function createPicture(renderer: WebGLRenderer): Picture {
+  const { extensions } = renderer;
+  const isFine = extensions.has('EXT_color_buffer_float') || extensions.has('EXT_color_buffer_half_float');
+  const target = new WebGLRenderTarget(1, 1, {
+    // It is linear: of eight bits dark shades show steps.
+    type: isFine ? HalfFloatType : UnsignedByteType,
+    minFilter: NearestFilter,
+    magFilter: NearestFilter,
+    depthTexture: new DepthTexture(1, 1),
+  });
+  const reach = new Vector2();
+  const material = new ShaderMaterial({
+    vertexShader,
+    fragmentShader,
+    depthTest: false,
+    depthWrite: false,
+    uniforms: {
+      picture: { value: target.texture },
+      depths: { value: target.depthTexture },
+      reach: { value: reach },
+      near: { value: 0 },
+      far: { value: 0 },
+      strength: { value: 0 },
+      thickness: { value: 0 },
+    },
+  });
+  const quad = new FullScreenQuad(material);
+  return {
+    setSize(width, height, ratio) {
+      target.setSize(width, height);
+      reach.set((REACH * ratio) / width, (REACH * ratio) / height);
+    },
+    add(scene, camera, anew) {
+      renderer.autoClear = anew;
+      renderer.setRenderTarget(target);
+      renderer.render(scene, camera);
+      renderer.setRenderTarget(null);
+    },
+    show(camera, lit, diameter) {
+      const { near, far, strength, thickness } = material.uniforms;
+      near!.value = camera.near;
+      far!.value = camera.far;
+      strength!.value = lit ? STRENGTH : 0;
+      thickness!.value = (THICKNESS / Math.LN2) * diameter;
+      renderer.autoClear = true;
+      quad.render(renderer);
+    },
+  };
+}
