@@ -148,6 +148,12 @@ export async function colorsShown(page, area) {
   return (await colorsIn(page, area)).length;
 }
 
+/** The share, 0 to 1, of such a square that has the colour which most of it has. */
+export async function commonestShown(page, area) {
+  const pixels = (await colorsIn(page, area)).map(({ pixels }) => pixels);
+  return Math.max(...pixels) / pixels.reduce((sum, some) => sum + some);
+}
+
 /** How bright the brightest pixel of such a square is, 0 to 255. */
 export async function brightestShown(page, area) {
   return Math.max(...(await colorsIn(page, area)).map(({ green }) => green));

@@ -14,6 +14,7 @@ import {
   brightestShown,
   choose,
   colorsShown,
+  commonestShown,
   drop,
   openBrowser,
   result,
@@ -1145,6 +1146,22 @@ test('a large cloud is drawn by many frames, until it is whole', async () => {
   assert.ok(last.length > 1 && last.every(({ isShown }) => !isShown), JSON.stringify(last));
   for (const [i, { first, end }] of last.entries()) assert.equal(end, last[i + 1]?.first ?? points, `from ${first}`);
   assert.ok((await backsShown(page)) > 0.9);
+});
+
+test('what lies behind an edge is set off, a slope is not', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'ball.ply', spherePly(20_000));
+  await result(page, 'ball.ply');
+  await page.getByRole('radio', { name: 'Plain' }).check();
+  assert.ok((await commonestShown(page)) > 0.999);
+  const centres = [
+    [0, 0, 0],
+    [2, 0, 1],
+  ];
+  await drop(page, 'two.ply', spherePly(40_000, { centres }));
+  await result(page, 'two.ply');
+  // Across the edge of the nearer one.
+  assert.ok((await commonestShown(page, { x: 600, y: 400 })) < 0.995);
 });
 
 test('a browser without WebGL 2 is told so', async () => {
