@@ -1038,6 +1038,18 @@ test('a narrow screen shows everything without scrolling sideways', async () => 
   await page.screenshot({ path: join(ARTEFACTS, 'narrow-panel.png') });
 });
 
+test('on a phone what was cancelled can be computed without the panel', async () => {
+  const viewport = { width: 390, height: 844 };
+  page = await browser.openPage(browser.isolated, { viewport, hasTouch: true, isMobile: true });
+  await pressWhen('Computing', 'cancel');
+  await choose(page, 'large.ply', spherePly(1_000_000));
+  await page.getByText('1,000,000 points, without normals').waitFor();
+  const compute = page.getByRole('button', { name: 'Compute' });
+  await compute.tap();
+  assert.match((await result(page, 'large.ply')).headline, /for 1,000,000 points/);
+  assert.ok(await compute.isHidden());
+});
+
 test('on a phone the cloud is seen below the open panel, and fingers meet what they press', async () => {
   for (const [width, height] of [
     [390, 844],

@@ -161,6 +161,7 @@ function showOptions(state: State, busy: boolean): void {
   again.disabled = problem !== '';
   rest(again, busy);
   again.textContent = scan?.hasNormals ? 'Re-run' : 'Compute';
+  element('#compute').hidden = busy || !scan || scan.hasNormals;
   const pending = !busy && state.used !== undefined && state.used.asked !== askedBy(state, state.up);
   element('#pending').hidden = !pending || problem !== '';
   if (pending) again.setAttribute('aria-describedby', 'pending');
