@@ -4,7 +4,7 @@ import { boundsOf } from '../../www/src/bounds.ts';
 import { guessUp } from '../../www/src/upright.ts';
 import { createViewer } from '../../www/src/viewer.ts';
 
-const viewer = createViewer(document.querySelector('canvas'));
+const viewer = createViewer(document.querySelector('canvas'), { edges: false });
 const frame = () => new Promise(requestAnimationFrame);
 
 async function numbers(file) {

@@ -56,8 +56,8 @@ def cgal_normals(positions, neighbours):
     mst_orient_normals(cloud, neighbours)
     seconds = time.perf_counter() - start
     normals = numpy.zeros_like(positions)
-    # Points that the tree does not reach have moved to the end, but an index stays with its point.
-    for index in cloud.indices():
+    # Points that the tree does not reach are marked as removed, with the sign that they had.
+    for index in range(len(positions)):
         normal = cloud.normal(index)
         normals[index] = normal.x(), normal.y(), normal.z()
     return normals, seconds
@@ -118,7 +118,7 @@ def judge(path, method, pipe):
 
 
 def run(path, method):
-    """In a process of its own: both can take for ever, or more memory than there is."""
+    """In a process of its own: any of them can take for ever, or more memory than there is."""
     ours, theirs = multiprocessing.Pipe(False)
     process = multiprocessing.Process(target=judge, args=(path, method, theirs))
     process.start()

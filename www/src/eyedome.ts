@@ -22,18 +22,25 @@ export interface Picture {
   setSize(width: number, height: number, ratio: number): void;
   /** Draws the scene into the picture, over what it has, or if it begins `anew` alone. */
   add(scene: Scene, camera: PerspectiveCamera, anew: boolean): void;
-  /** Puts it on the canvas; with eye-dome lighting if the points are `lit`, which have a diameter in the world. */
-  show(camera: PerspectiveCamera, lit: boolean, diameter: number): void;
+  /** Puts it on the canvas, with eye-dome lighting if it is told how large the discs of the points are. */
+  show(camera: PerspectiveCamera, discs?: Discs): void;
+}
+
+export interface Discs {
+  /** In units of the world. */
+  diameter: number;
+  /** Under which, in radians, they are seen at least. */
+  angle: number;
 }
 
 /** How much darker it gets: so many octaves for each octave that a place is farther away than those round it. */
 const STRENGTH = 200;
 /** What is darkest still has this much of its light. */
 const LEAST = 0.3;
-/** How far away, in pixels of the page, places are looked at. */
+/** How far away, in pixels of the page, places are looked at; in whole ones of the screen, as far on both sides. */
 const REACH = 1.5;
-/** Points are discs across the view, so that those of one surface lie as far behind each other, in diameters. */
-const THICKNESS = 0.5;
+/** Discs lie across the view, so that those of one surface are as far behind each other, in diameters. */
+const THICKNESS = 0.8;
 
 const vertexShader = /* glsl */ `
 varying vec2 place;
@@ -51,6 +58,7 @@ uniform float near;
 uniform float far;
 uniform float strength;
 uniform float thickness;
+uniform float leastThickness;
 varying vec2 place;
 
 // In octaves, so that the same step is as dark from afar.
@@ -58,10 +66,12 @@ float away(float depth) {
   return log2(near * far / (far - depth * (far - near)));
 }
 
-// How much nearer another place is. Where nothing is, that tells nothing.
-float nearer(vec2 at, float own) {
-  float depth = texture2D(depths, at).x;
-  return depth == 1.0 ? 0.0 : own - away(depth);
+// How much nearer than a place those on both sides of it are, on a slope nothing. Where one of them is empty, or not in
+// the picture, that cannot be told.
+float nearer(vec2 aside, float own) {
+  vec2 depth = vec2(texture2D(depths, place + aside).x, texture2D(depths, place - aside).x);
+  vec2 inside = step(abs(place - 0.5) + abs(aside), vec2(0.5));
+  return max(depth.x, depth.y) == 1.0 ? 0.0 : inside.x * inside.y * (2.0 * own - away(depth.x) - away(depth.y));
 }
 
 void main() {
@@ -69,11 +79,10 @@ void main() {
   if (strength > 0.0 && shown.a > 0.0) {
     float own = away(texture2D(depths, place).x);
     float behind = 0.0;
-    float same = thickness * exp2(-own);
+    float same = max(thickness * exp2(-own), leastThickness);
     for (int i = 0; i < 4; i++) {
       float turn = float(i) * 0.7853982;
-      vec2 step = reach * vec2(cos(turn), sin(turn));
-      behind += max(0.0, nearer(place + step, own) + nearer(place - step, own) - same);
+      behind += max(0.0, nearer(reach * vec2(cos(turn), sin(turn)), own) - same);
     }
     shown.rgb *= mix(${LEAST}, 1.0, exp2(-strength * behind / 8.0));
   }
@@ -106,13 +115,15 @@ export function createPicture(renderer: WebGLRenderer): Picture {
       far: { value: 0 },
       strength: { value: 0 },
       thickness: { value: 0 },
+      leastThickness: { value: 0 },
     },
   });
   const quad = new FullScreenQuad(material);
   return {
     setSize(width, height, ratio) {
       target.setSize(width, height);
-      reach.set((REACH * ratio) / width, (REACH * ratio) / height);
+      const pixels = Math.round(REACH * ratio);
+      reach.set(pixels / width, pixels / height);
     },
     add(scene, camera, anew) {
       renderer.autoClear = anew;
@@ -120,12 +131,14 @@ export function createPicture(renderer: WebGLRenderer): Picture {
       renderer.render(scene, camera);
       renderer.setRenderTarget(null);
     },
-    show(camera, lit, diameter) {
-      const { near, far, strength, thickness } = material.uniforms;
+    show(camera, discs) {
+      const { near, far, strength, thickness, leastThickness } = material.uniforms;
       near!.value = camera.near;
       far!.value = camera.far;
-      strength!.value = lit ? STRENGTH : 0;
-      thickness!.value = (THICKNESS / Math.LN2) * diameter;
+      strength!.value = discs ? STRENGTH : 0;
+      // Of the distance, in octaves.
+      thickness!.value = (THICKNESS / Math.LN2) * (discs?.diameter ?? 0);
+      leastThickness!.value = (THICKNESS / Math.LN2) * (discs?.angle ?? 0);
       renderer.autoClear = true;
       quad.render(renderer);
     },

@@ -158,10 +158,11 @@ function showOptions(state: State, busy: boolean): void {
     note.scrollIntoView({ block: 'nearest' });
   }
   const again = element<HTMLButtonElement>('#again');
-  again.disabled = problem !== '';
+  const first = element<HTMLButtonElement>('#compute');
+  again.disabled = first.disabled = problem !== '';
   rest(again, busy);
   again.textContent = scan?.hasNormals ? 'Re-run' : 'Compute';
-  element('#compute').hidden = busy || !scan || scan.hasNormals;
+  first.hidden = busy || !scan || scan.hasNormals;
   const pending = !busy && state.used !== undefined && state.used.asked !== askedBy(state, state.up);
   element('#pending').hidden = !pending || problem !== '';
   if (pending) again.setAttribute('aria-describedby', 'pending');

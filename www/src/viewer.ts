@@ -85,9 +85,11 @@ const LEAST_PIXELS = 1.5;
 /** Most that a point measures without a choice of its size, where the bulk of the cloud has radius 1: a few are dots. */
 const LARGEST = 0.2;
 
-export function createViewer(canvas: HTMLCanvasElement): Viewer {
+/** `edges`: whether what lies behind an edge is darker there. */
+export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): Viewer {
   const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
-  const renderer = new WebGLRenderer({ canvas, alpha: true, antialias: false, powerPreference: 'high-performance' });
+  const powerPreference = 'high-performance';
+  const renderer = new WebGLRenderer({ canvas, alpha: true, antialias: false, depth: false, powerPreference });
   const picture = createPicture(renderer);
   const camera = new PerspectiveCamera(38, 1, 0.01, 100);
   camera.position.set(0, 0, 3);
@@ -122,6 +124,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   let fileColors: BufferAttribute | undefined;
   let hasCurvature = false;
   let shading: Shading = 'shaded';
+  /** Whether colours stand for something, and so must stay what they are. */
+  let isScale = false;
   let pointSize = 1;
   let margins: Margins = { top: 0, right: 0, bottom: 0, left: 0 };
   let choices = [margins];
@@ -170,8 +174,8 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
   }
 
   function show(): void {
-    // Colours that stand for something stay what they are.
-    picture.show(camera, shading !== 'normals' && shading !== 'curvature', material.size);
+    const angle = (LEAST_PIXELS * 2 * Math.tan((camera.fov * Math.PI) / 360)) / canvas.clientHeight;
+    picture.show(camera, edges && !isScale ? { diameter: material.size, angle } : undefined);
   }
 
   /** Draws the next points of a still cloud. Until it is whole, what is drawn in motion stays on the canvas. */
@@ -256,6 +260,7 @@ export function createViewer(canvas: HTMLCanvasElement): Viewer {
     const possible = shading === 'curvature' ? (bent ? 'colors' : 'shaded') : shading;
     const wanted = lit || possible === 'plain' ? possible : 'colors';
     material.shading = wanted === 'colors' && !colors ? 'plain' : wanted;
+    isScale = wanted === 'normals' || (wanted === 'colors' && bent);
   }
 
   /** Turns the axis of the file upwards. */
