@@ -158,11 +158,11 @@ function showOptions(state: State, busy: boolean): void {
     note.scrollIntoView({ block: 'nearest' });
   }
   const again = element<HTMLButtonElement>('#again');
-  const first = element<HTMLButtonElement>('#compute');
-  again.disabled = first.disabled = problem !== '';
+  const compute = element<HTMLButtonElement>('#compute');
+  again.disabled = compute.disabled = problem !== '';
   rest(again, busy);
   again.textContent = scan?.hasNormals ? 'Re-run' : 'Compute';
-  first.hidden = busy || !scan || scan.hasNormals;
+  compute.hidden = busy || !scan || scan.hasNormals;
   const pending = !busy && state.used !== undefined && state.used.asked !== askedBy(state, state.up);
   element('#pending').hidden = !pending || problem !== '';
   if (pending) again.setAttribute('aria-describedby', 'pending');

@@ -1,7 +1,7 @@
-// Eye-dome lighting: what lies behind the edge of something nearer is darker there, as if light came from the eye and did
-// not reach round edges. So leaves, walls and limbs stand out from each other whatever their normals, and before these
-// are known. After Boucheny and Ribes, "Eye-Dome Lighting: a non-photorealistic shading technique", Kitware Source 17
-// (2011).
+// The picture of a cloud: it grows out of sight, and is put on the canvas with eye-dome lighting. What lies behind the edge
+// of something nearer is darker there, as if light came from the eye and did not reach round edges. So leaves, walls and
+// limbs stand out from each other whatever their normals, and before these are known. After Boucheny and Ribes, "Eye-Dome
+// Lighting: a non-photorealistic shading technique", Kitware Source 17 (2011).
 import {
   DepthTexture,
   HalfFloatType,
@@ -16,7 +16,6 @@ import {
 } from 'three';
 import { FullScreenQuad } from 'three/examples/jsm/postprocessing/Pass.js';
 
-/** A picture that grows out of sight, and is then put on the canvas. */
 export interface Picture {
   /** In pixels of the screen, of which there are `ratio` to one of the page. */
   setSize(width: number, height: number, ratio: number): void;

@@ -14,8 +14,8 @@ import {
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { createPointMaterial, type Shading as MaterialShading } from 'bilinormal/three';
 import type { Bounds } from './bounds';
-import { createPicture } from './eyedome';
 import { pickPoint } from './pick';
+import { createPicture } from './picture';
 import { spacingOf } from './spacing';
 import { spread } from './spread';
 
@@ -124,8 +124,6 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
   let fileColors: BufferAttribute | undefined;
   let hasCurvature = false;
   let shading: Shading = 'shaded';
-  /** Whether colours stand for something, and so must stay what they are. */
-  let isScale = false;
   let pointSize = 1;
   let margins: Margins = { top: 0, right: 0, bottom: 0, left: 0 };
   let choices = [margins];
@@ -174,9 +172,13 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
   }
 
   function show(): void {
-    const angle = (LEAST_PIXELS * 2 * Math.tan((camera.fov * Math.PI) / 360)) / canvas.clientHeight;
-    picture.show(camera, edges && !isScale ? { diameter: material.size, angle } : undefined);
+    // Colours that stand for something stay what they are.
+    const isScale = isBent() || material.shading === 'normals';
+    picture.show(camera, edges && !isScale ? { diameter: material.size, angle: LEAST_PIXELS * pixel() } : undefined);
   }
+
+  /** What a pixel of the page spans, at a distance of 1. */
+  const pixel = () => (2 * Math.tan((camera.fov * Math.PI) / 360)) / canvas.clientHeight;
 
   /** Draws the next points of a still cloud. Until it is whole, what is drawn in motion stays on the canvas. */
   function fill(elapsed: number): void {
@@ -249,9 +251,12 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
     }
   }
 
+  /** Whether it is the curvature that is shown. */
+  const isBent = () => shading === 'curvature' && hasCurvature;
+
   function chooseShading(): void {
     const lit = whole.hasAttribute('normal');
-    const bent = shading === 'curvature' && hasCurvature;
+    const bent = isBent();
     const colors = bent ? whole.getAttribute('curvature') : fileColors;
     for (const geometry of [whole, sparse]) {
       if (colors) geometry?.setAttribute('color', colors);
@@ -260,7 +265,6 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
     const possible = shading === 'curvature' ? (bent ? 'colors' : 'shaded') : shading;
     const wanted = lit || possible === 'plain' ? possible : 'colors';
     material.shading = wanted === 'colors' && !colors ? 'plain' : wanted;
-    isScale = wanted === 'normals' || (wanted === 'colors' && bent);
   }
 
   /** Turns the axis of the file upwards. */
@@ -311,7 +315,7 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
    */
   function framingDistance(direction: Vector3, half: Vector3, { top, right: end, bottom, left }: Margins): number {
     const { clientWidth: width, clientHeight: height } = canvas;
-    const slope = Math.tan((camera.fov * Math.PI) / 360) / height;
+    const slope = pixel() / 2;
     // Where there is nothing else to choose, what is left may be too little; where there is, it loses.
     const share = choices.length > 1 ? 0.01 : 0.25;
     const across = slope * Math.max(width - left - end, share * width);
@@ -376,9 +380,8 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
     }
     const eye = new Vector3(...viewer.eye());
     const along = points.worldToLocal(behind).sub(eye).normalize();
-    const slope = (6 / box.height) * 2 * Math.tan((camera.fov * Math.PI) / 360);
     const radius = material.size / 2 / turned.scale.x;
-    return pickPoint(cloud.positions, eye.toArray(), along.toArray(), slope, radius);
+    return pickPoint(cloud.positions, eye.toArray(), along.toArray(), 6 * pixel(), radius);
   }
 
   function focus(event: MouseEvent): void {
