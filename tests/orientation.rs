@@ -1065,6 +1065,24 @@ fn mirrors_and_permutations_change_only_what_they_must() {
     assert_eq!(signs(&reversed, &truth), 1.0);
 }
 
+/// A sliver in the hole of a bowl: by itself it would face up, by convention.
+#[test]
+fn a_few_points_face_as_what_is_round_them() {
+    const COUNT: usize = 8;
+    let mut random = Random(22);
+    for axis in [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [0.0, -0.8, -0.6], [-0.6, 0.0, 0.8]] {
+        let dot = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|i| a[i] * b[i]).sum::<f64>();
+        let bowl = sphere(40_000, 23).normals.into_iter().filter(|normal| (0.0..0.95).contains(&dot(normal, &axis)));
+        let sliver: Vec<[f64; 3]> = (0..COUNT).map(|_| unit(axis.map(|x| x + 0.02 * random.signed()))).collect();
+        let cloud = Cloud::of(sliver.into_iter().chain(bowl).map(|normal| (normal, normal)));
+        let result = orient(&cloud.points, Orient::Outward);
+        for (normal, truth) in result.normals.chunks_exact(3).zip(&cloud.normals).take(COUNT) {
+            assert!(dot(&[0, 1, 2].map(|i| f64::from(normal[i])), truth) > 0.9, "{axis:?}: {normal:?}");
+        }
+        assert_eq!(components(&result).len(), 1);
+    }
+}
+
 #[test]
 fn a_stray_point_turns_nothing() {
     let cloud = torus(50_000, 21);

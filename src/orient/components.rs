@@ -74,6 +74,7 @@ impl Side {
 }
 
 /// What was decided for a component.
+#[derive(Clone, Copy)]
 pub(super) struct Decision {
     pub component: Component,
     pub patches: u64,

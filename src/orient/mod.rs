@@ -5,7 +5,7 @@
 //! are open to the air says which way is out ([`air`]), and the signs are chosen that these agree with best ([`groups`]), of
 //! open surfaces also what their parts see of each other ([`looks`]). These then face what stands before them ([`facing`]), or the
 //! scanner, if one saw all: where it stood, if densities tell that ([`station`]), or the direction from which it did ([`view`]).
-//! In noise normals then become means of those about them ([`means`]).
+//! Of a few points that are no surface what is round them tells the side ([`specks`]). In noise normals then become means of those about them ([`means`]).
 
 mod air;
 mod ball;
@@ -22,6 +22,7 @@ mod patches;
 mod place;
 mod sheets;
 mod signs;
+mod specks;
 mod spots;
 mod station;
 mod support;
@@ -147,9 +148,10 @@ fn surfaces(
         }
         None => {}
     }
-    let components = Components::of(&decisions)?;
     let last = stage.part(0.95..1.0);
-    let of_point = turn(grid, &patches, &members, &signs, normals, options.components, &last.part(0.0..0.4))?;
+    specks::settle(grid, &patches, &mut signs, &mut decisions, &last.part(0.0..0.1))?;
+    let components = Components::of(&decisions)?;
+    let of_point = turn(grid, &patches, &members, &signs, normals, options.components, &last.part(0.1..0.4))?;
     if options.method == Method::Bilinear && options.cell == Cell::Auto {
         means::average(points, &cubes, (&patches, &members), &signs, normals, &last.part(0.4..1.0))?;
     }
