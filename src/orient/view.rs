@@ -149,30 +149,30 @@ impl View {
         let towards = self.eye.towards.as_vec3();
         let along = towards.abs().max_position();
         let (across, up) = ((along + 1) % 3, (along + 2) % 3);
-        let mut spots = Vec::new();
-        reserve(&mut spots, count, WHAT)?;
-        spots.extend(all.map(|Signed { place, normal, points, .. }| {
+        let mut projected = Vec::new();
+        reserve(&mut projected, count, WHAT)?;
+        projected.extend(all.map(|Signed { place, normal, points, .. }| {
             let direction = self.eye.direction(place);
             let square =
                 |axis: usize| (place[axis] - place[along] * (direction[axis] / direction[along])).floor() as i32;
             let cosine = self.eye.cosine(normal, place);
             let rise = direction.normalize() - normal / cosine.abs().max(STEEPEST).copysign(cosine);
-            Spot {
+            Projected {
                 square: (square(across), square(up)),
                 depth: towards.dot(place),
                 slope: (rise[across] * rise[across] + rise[up] * rise[up]).sqrt(),
                 points,
             }
         }));
-        let (squares, fronts) = squares(&spots)?;
+        let (squares, fronts) = squares(&projected)?;
         let (mut hidden, mut all) = (0.0, 0.0);
-        for (spot, square) in spots.iter().zip(squares) {
-            let front = &spots[fronts[square] as usize];
-            let steeper = SQRT_2 * front.slope.max(spot.slope);
+        for (patch, square) in projected.iter().zip(squares) {
+            let front = &projected[fronts[square] as usize];
+            let steeper = SQRT_2 * front.slope.max(patch.slope);
             let least = BEHIND + DEVIATIONS * noise + steeper;
-            all += f64::from(spot.points);
-            if front.depth - spot.depth > least {
-                hidden += f64::from(spot.points);
+            all += f64::from(patch.points);
+            if front.depth - patch.depth > least {
+                hidden += f64::from(patch.points);
             }
         }
         Ok(hidden / all)
@@ -197,7 +197,7 @@ fn best(eye: Eye, some: &[Signed], components: usize, range: [f64; 2], stage: &S
 }
 
 /// A patch as the scanner sees it.
-struct Spot {
+struct Projected {
     /// Where it is across the view, in edges.
     square: (i32, i32),
     /// How near it is, in edges.
@@ -207,26 +207,27 @@ struct Spot {
     points: u32,
 }
 
-impl Spot {
+impl Projected {
     /// Whether it stands before another one; of two at one depth the steeper does.
     fn is_before(&self, other: &Self) -> bool {
         self.depth.total_cmp(&other.depth).then(self.slope.total_cmp(&other.slope)).is_gt()
     }
 }
 
-/// For each spot the number of its square, in a table by hash, and for each square the spot that stands before all others there.
-fn squares(spots: &[Spot]) -> Result<(Vec<usize>, Vec<u32>), Error> {
+/// For each patch the number of its square, in a table by hash, and for each square the patch that stands before all others
+/// there.
+fn squares(all: &[Projected]) -> Result<(Vec<usize>, Vec<u32>), Error> {
     const FREE: u32 = u32::MAX;
-    let bits = (2 * spots.len()).next_power_of_two().ilog2();
+    let bits = (2 * all.len()).next_power_of_two().ilog2();
     let (mut squares, mut fronts) = (Vec::new(), filled(FREE, 1 << bits, WHAT)?);
-    reserve(&mut squares, spots.len(), WHAT)?;
-    for (spot, number) in spots.iter().zip(0..) {
-        let (across, up) = spot.square;
+    reserve(&mut squares, all.len(), WHAT)?;
+    for (patch, number) in all.iter().zip(0..) {
+        let (across, up) = patch.square;
         let mut square = (mixed(across as u64, up as u64, 0) >> (u64::BITS - bits)) as usize;
-        while fronts[square] != FREE && spots[fronts[square] as usize].square != spot.square {
+        while fronts[square] != FREE && all[fronts[square] as usize].square != patch.square {
             square = (square + 1) % fronts.len();
         }
-        if fronts[square] == FREE || spot.is_before(&spots[fronts[square] as usize]) {
+        if fronts[square] == FREE || patch.is_before(&all[fronts[square] as usize]) {
             fronts[square] = number;
         }
         squares.push(square);
