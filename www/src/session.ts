@@ -1,11 +1,13 @@
 // What a person can have done, as one flow: file -> readPointCloud -> estimateNormals, meanwhile viewer.show ->
 // viewer.setNormals -> report. One job runs at a time; a new one cancels it. Curvature is computed while it is shown.
-import { estimateNormals, readPointCloud, writePly, type EstimateOptions, type PointCloud } from 'bilinormal';
+import { estimateNormals, writePly, type EstimateOptions } from 'bilinormal';
 import { scannerOf } from '../../src/js/scanner';
 import { boundsOf } from './bounds';
 import { compare } from './compare';
-import { Foreign, foreign } from './foreign';
-import { count, measure } from './format';
+import { download, makeSample, onlyScans, read } from './files';
+import { foreign } from './foreign';
+import { count } from './format';
+import { createJobs, messageOf, type Step } from './jobs';
 import { METHODS, askedBy, hasSurfaces, orientOf, parseOptions, type OptionsForm } from './options';
 import { colorsOf } from './ramp';
 import { UNTURNED, type NormalSource, type State, type Store, type Turned } from './state';
@@ -37,9 +39,6 @@ export interface Session {
   cancel(): void;
 }
 
-const SAMPLE_POINTS = 500_000;
-/** No larger file goes into one buffer of wasm. */
-const FILE_MOST = 2 ** 31 - 1;
 /** The surface of a point without a normal. */
 const NO_SURFACE = 0xffff_ffff;
 
@@ -70,50 +69,18 @@ interface Flipped {
   flips: Flip[];
 }
 
-interface Step {
-  signal: AbortSignal;
-  /** Names what runs now; returns the receiver of its progress. */
-  begin(title: string): (progress: { phase: string; fraction: number }) => void;
-}
-
 export function createSession(store: Store, viewer: Viewer): Session {
-  let current: AbortController | undefined;
+  const jobs = createJobs(store, () => {
+    const { scan, shading } = store.state;
+    // Curvature that did not come, because of an error or a cancel, is not what is shown.
+    return { shading: shading === 'curvature' && !scan?.hasCurvature ? 'shaded' : shading };
+  });
   let shown: Shown | undefined;
   /** What was flipped by hand, the last at the end. */
   let flips: Flip[] = [];
   let areSaved = false;
   /** What can be brought back. */
   let gone: Flipped | undefined;
-
-  /** Runs one job to its end; what it throws becomes the message on the page, unless it was cancelled. */
-  async function run(trouble: string, work: (step: Step) => Promise<void>): Promise<void> {
-    current?.abort();
-    const mine = new AbortController();
-    current = mine;
-    const tell = (title: string, phase: string, fraction: number | undefined) => {
-      if (current === mine) store.set({ job: { title, phase, fraction } });
-    };
-    store.set({ error: undefined });
-    try {
-      await work({
-        signal: mine.signal,
-        begin(title) {
-          tell(title, '', undefined);
-          return ({ phase, fraction }) => tell(title, phase, fraction);
-        },
-      });
-    } catch (error) {
-      if (!mine.signal.aborted) store.set({ error: messageOf(trouble, error) });
-    }
-    if (current === mine) end();
-  }
-
-  function end(): void {
-    current = undefined;
-    const { scan, shading } = store.state;
-    // Curvature that did not come, because of an error or a cancel, is not what is shown.
-    store.set({ job: undefined, shading: shading === 'curvature' && !scan?.hasCurvature ? 'shaded' : shading });
-  }
 
   async function show(file: File, step: Step): Promise<void> {
     const started = performance.now();
@@ -255,7 +222,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
   async function bringBack(): Promise<void> {
     const back = gone;
     if (!back) return;
-    await run(back.file.name, async (step) => {
+    await jobs.run(back.file.name, async (step) => {
       const { note } = store.state;
       if (shown?.file !== back.file) await show(back.file, step);
       // What is cancelled now can be tried again, unless the other file had flips, too.
@@ -283,12 +250,12 @@ export function createSession(store: Store, viewer: Viewer): Session {
       const file = scans[0] ?? files[0];
       if (!file) return;
       // What was dropped by mistake stops no work, unless that ends meanwhile.
-      const reason = current && (await foreign(file));
-      if (reason && current) {
+      const reason = jobs.areRunning && (await foreign(file));
+      if (reason && jobs.areRunning) {
         store.set({ error: `${messageOf(file.name, reason)} The work goes on.` });
         return;
       }
-      await run(file.name, async (step) => {
+      await jobs.run(file.name, async (step) => {
         await show(file, step);
         // Unless there is more to lose.
         const { note = { text: `The first of ${count(scans.length)} scans is shown.` } } = store.state;
@@ -298,19 +265,19 @@ export function createSession(store: Store, viewer: Viewer): Session {
     },
 
     openSample: () =>
-      run('The sample', async (step) => {
+      jobs.run('The sample', async (step) => {
         step.begin('Making the sample');
         await show(await makeSample(step.signal), step);
         await shade(step);
       }),
 
-    estimate: () => run('Computing normals', shade),
+    estimate: () => jobs.run('Computing normals', shade),
 
     async addCurvature() {
       const { result, options, form } = shown ?? {};
       if (!result || !options || !form || result.curvature) return;
       const { flipped, turnedSurfaces } = store.state;
-      await run('Computing curvature', (step) => shadeBy(options, form, { flipped, turnedSurfaces }, step));
+      await jobs.run('Computing curvature', (step) => shadeBy(options, form, { flipped, turnedSurfaces }, step));
     },
 
     showNormals(source) {
@@ -338,7 +305,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
     bringBack,
 
     save: () =>
-      run('Saving', async (step) => {
+      jobs.run('Saving', async (step) => {
         if (!shown?.result) return;
         const { file, result } = shown;
         const { normals, curvature } = result;
@@ -351,10 +318,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
         download(ply, `${file.name.replace(/(-normals)?\.[^.]*$/, '')}-normals.ply`);
       }),
 
-    cancel() {
-      current?.abort();
-      end();
-    },
+    cancel: () => jobs.cancel(),
   };
 }
 
@@ -368,50 +332,4 @@ function negate(normals: Float32Array, components?: Uint32Array, surface?: numbe
   for (let i = 0; i < normals.length; i++) {
     if (components?.[Math.floor(i / 3)] === surface) normals[i] = 0 - normals[i]!;
   }
-}
-
-/** Those that begin as PLY files do. */
-async function onlyScans(files: File[]): Promise<File[]> {
-  const reasons = await Promise.all(files.map(foreign));
-  return files.filter((_, i) => !reasons[i]);
-}
-
-async function read(file: File, { signal, begin }: Step): Promise<PointCloud> {
-  const onProgress = begin(`Reading ${file.name}`);
-  try {
-    // Refused there too, as data without memory for it.
-    if (file.size > FILE_MOST) throw new Error(tooLarge(file));
-    return await readPointCloud(file, { signal, onProgress });
-  } catch (error) {
-    // Which says what it is, and what to do with it.
-    throw (await foreign(file)) ?? error;
-  }
-}
-
-function makeSample(signal: AbortSignal): Promise<File> {
-  const worker = new Worker(new URL('./sample.worker.ts', import.meta.url), { type: 'module' });
-  return new Promise<File>((resolve, reject) => {
-    signal.addEventListener('abort', () => reject(signal.reason));
-    worker.onmessage = ({ data }: MessageEvent<Uint8Array<ArrayBuffer>>) => resolve(new File([data], 'sample.ply'));
-    worker.onerror = () => reject(new Error('the script that makes it did not load'));
-    worker.postMessage({ points: SAMPLE_POINTS });
-  }).finally(() => worker.terminate());
-}
-
-function download(blob: Blob, name: string): void {
-  const link = document.createElement('a');
-  link.href = URL.createObjectURL(blob);
-  link.download = name;
-  link.click();
-  // The browser has to get hold of the data first.
-  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
-}
-
-function messageOf(trouble: string, error: unknown): string {
-  const message = error instanceof Error ? error.message : String(error);
-  return `${trouble}${error instanceof Foreign ? '' : ':'} ${message}`;
-}
-
-function tooLarge({ size }: File): string {
-  return `the file has ${measure(size / 2 ** 30)} GiB, and up to 2 can be opened; save it with fewer points, or as binary if it is text`;
 }

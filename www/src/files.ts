@@ -1,0 +1,50 @@
+// Files that come to the page and leave it: scans from a disk, the sample, what is saved.
+import { readPointCloud, type PointCloud } from 'bilinormal';
+import { foreign } from './foreign';
+import { measure } from './format';
+import type { Step } from './jobs';
+
+/** No larger file goes into one buffer of wasm. */
+const FILE_MOST = 2 ** 31 - 1;
+const SAMPLE_POINTS = 500_000;
+
+/** Those that begin as PLY files do. */
+export async function onlyScans(files: File[]): Promise<File[]> {
+  const reasons = await Promise.all(files.map(foreign));
+  return files.filter((_, i) => !reasons[i]);
+}
+
+export async function read(file: File, { signal, begin }: Step): Promise<PointCloud> {
+  const onProgress = begin(`Reading ${file.name}`);
+  try {
+    // Refused there too, as data without memory for it.
+    if (file.size > FILE_MOST) throw new Error(tooLarge(file));
+    return await readPointCloud(file, { signal, onProgress });
+  } catch (error) {
+    // Which says what it is, and what to do with it.
+    throw (await foreign(file)) ?? error;
+  }
+}
+
+export function makeSample(signal: AbortSignal): Promise<File> {
+  const worker = new Worker(new URL('./sample.worker.ts', import.meta.url), { type: 'module' });
+  return new Promise<File>((resolve, reject) => {
+    signal.addEventListener('abort', () => reject(signal.reason));
+    worker.onmessage = ({ data }: MessageEvent<Uint8Array<ArrayBuffer>>) => resolve(new File([data], 'sample.ply'));
+    worker.onerror = () => reject(new Error('the script that makes it did not load'));
+    worker.postMessage({ points: SAMPLE_POINTS });
+  }).finally(() => worker.terminate());
+}
+
+export function download(blob: Blob, name: string): void {
+  const link = document.createElement('a');
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  // The browser has to get hold of the data first.
+  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+}
+
+function tooLarge({ size }: File): string {
+  return `the file has ${measure(size / 2 ** 30)} GiB, and up to 2 can be opened; save it with fewer points, or as binary if it is text`;
+}
