@@ -110,27 +110,26 @@ function pack(name, module, extra) {
 }
 
 /**
- * Lets the threads build start its pool by `src/js/pool.ts` instead of the helper of wasm-bindgen-rayon, which imports
- * a folder (only bundlers resolve that), knows no Node, and waits for ever when a worker fails to load.
+ * Lets the threads build start its pool by what the worker puts into `pool` (`src/js/pool.ts`) instead of the helper of
+ * wasm-bindgen-rayon, which imports a folder (only bundlers resolve that), knows no Node, and waits for ever when a worker
+ * fails to load. Not by an import: bundlers would look for it in the script of the worker, and WebKit runs a worker's script
+ * once more when something imports it.
  */
 function withOwnPool(glue) {
-  const helper = /(import \{ startWorkers \} from )'\.\/snippets\/wasm-bindgen-rayon-[^']*\/workerHelpers\.js'/;
-  if (!helper.test(glue))
-    throw new Failure('the glue of the threads build has no import of startWorkers to point at pool.js');
-  return glue.replace(helper, "$1'../pool.js'");
+  const helper = /import \{ startWorkers \} from '\.\/snippets\/wasm-bindgen-rayon-[^']*\/workerHelpers\.js';/;
+  if (!helper.test(glue)) throw new Failure('the glue of the threads build has no import of startWorkers');
+  return glue.replace(helper, 'export const pool = {};\nconst startWorkers = (...all) => pool.start(...all);');
 }
 
 /** The scripts that are imported or started by their own address; every other module goes into those that use it. */
-const SCRIPTS = ['index', 'node', 'link', 'pool', 'worker', 'worker-node', 'thread', 'thread-node', 'three', 'cli'];
+const SCRIPTS = ['index', 'node', 'link', 'worker', 'worker-node', 'thread', 'thread-node', 'three', 'cli'];
 
 function buildJavaScript() {
   // What an older source left behind must not enter the package.
   for (const path of filesIn('dist').filter((path) => dirname(path) === 'dist')) rmSync(join(root, path));
   run('tsc', ['--project', '.']);
   // `new URL('./worker.js', import.meta.url)` and the imports of glue stay as they are, for browsers and bundlers.
-  const apart = ['./link.js', './pool.js', './node.js', './single/*', './threads/*'].map(
-    (path) => `--external:${path}`,
-  );
+  const apart = ['./link.js', './node.js', './single/*', './threads/*'].map((path) => `--external:${path}`);
   const scripts = SCRIPTS.map((name) => `src/js/${name}.ts`);
   const form = ['--format=esm', '--target=es2022', '--log-level=warning'];
   run('esbuild', [...scripts, '--bundle', '--packages=external', ...apart, ...form, '--outdir=dist']);

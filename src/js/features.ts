@@ -16,6 +16,8 @@ export function detect(): Features {
     reason = 'not cross-origin isolated; see the headers Cross-Origin-Opener-Policy and Cross-Origin-Embedder-Policy';
   else {
     try {
+      // WebKitGTK has such memory, but lets no other thread have it.
+      new SharedArrayBuffer(0);
       new WebAssembly.Memory({ initial: 1, maximum: 1, shared: true });
     } catch {
       reason = 'no shared WebAssembly memory in this engine';

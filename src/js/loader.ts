@@ -1,6 +1,6 @@
 // Which of the two builds runs, and its start.
 import { coded } from './failure.js';
-import { pool } from './pool.js';
+import { startWorkers } from './pool.js';
 import type { Mode, Start, StartWorker } from './protocol.js';
 import type { Glue, ThreadsGlue } from './wasm.js';
 
@@ -48,9 +48,11 @@ async function loadThreads(threads: number, start: Start, platform: Platform): P
     start.full ? new URL('./threads/full.wasm', import.meta.url) : new URL('./threads/core.wasm', import.meta.url);
   const module = compile(start, 'threads', url, platform);
   const loaded = await begin<ThreadsGlue>(import('./threads/bilinormal.js' as string), module, start, true);
-  pool.start = platform.startThread;
-  pool.channel = start.channel;
-  await loaded.glue.initThreadPool(threads);
+  const { pool, initThreadPool } = loaded.glue;
+  pool.start = async (...all) => {
+    pool.kept = await startWorkers(platform.startThread, start.channel, ...all);
+  };
+  await initThreadPool(threads);
   return { ...loaded, mode: { mode: 'threads', threads } };
 }
 

@@ -1,5 +1,7 @@
 // The border to the wasm modules, as the generated glue in single/ and threads/ exports it.
 
+import type { PoolBuilder } from './pool.js';
+
 /** Hears where a call stands; `fraction` is of the whole call into wasm. */
 export type Tell = (phase: string, fraction: number) => void;
 
@@ -61,6 +63,11 @@ export interface Glue {
 
 /** What only the threads build exports. */
 export interface ThreadsGlue extends Glue {
+  /** How `initThreadPool` starts the threads, to be set before, and what must be kept as long as they run. */
+  pool: {
+    start?(module: WebAssembly.Module, memory: WebAssembly.Memory, builder: PoolBuilder): Promise<void>;
+    kept?: unknown;
+  };
   initThreadPool(threads: number): Promise<void>;
   wbg_rayon_start_worker(receiver: number): void;
 }

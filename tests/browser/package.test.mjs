@@ -1,7 +1,7 @@
 // The packed package in a browser, loaded in each way that docs/embedding.md promises: plain files on the page's own origin,
 // a host on another origin, and a bundle; with and without isolation.
 import assert from 'node:assert/strict';
-import { existsSync, mkdirSync, readFileSync, renameSync, symlinkSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdirSync, readFileSync, readdirSync, renameSync, symlinkSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
 import { chromium } from 'playwright-core';
@@ -200,6 +200,16 @@ test('a bundle by Vite, with its default settings, on the own origin and on anot
   writePage(folder);
   writeFileSync(join(folder, 'main.js'), `import * as bilinormal from 'bilinormal'; window.bilinormal = bilinormal;`);
   await build({ root: folder, logLevel: 'error' });
+  const scripts = readdirSync(join(folder, 'dist', 'assets')).filter((name) => name.endsWith('.js'));
+  for (const name of scripts) {
+    // WebKit would run that once more, and all that the worker knows would be gone.
+    const script = readFileSync(join(folder, 'dist', 'assets', name), 'utf8');
+    assert.doesNotMatch(
+      script,
+      /\b(from|import)\s*\(?["'`]\.\/(worker|thread)-/,
+      `${name} imports the script of a worker`,
+    );
+  }
   const isolated = await use(await open(join(folder, 'dist'), ISOLATION));
   checkIsolated(isolated);
   assert.equal(isolated.hash, hash);

@@ -23,13 +23,13 @@ export function estimate(positions, double, options, tell) {
 }
 `;
 const threads = (thread) => `
-import { startWorkers } from '../pool.js';
 export * from '../single/bilinormal.js';
 import init from '../single/bilinormal.js';
 let given;
+export const pool = {};
 export default async (options) => { given = options; ${thread.load}; return init(options); };
 export const initThreadPool = (count) =>
-  startWorkers(given.module_or_path, given.memory, { numThreads: () => count, receiver: () => 1, build() {} });
+  pool.start(given.module_or_path, given.memory, { numThreads: () => count, receiver: () => 1, build() {} });
 export function wbg_rayon_start_worker() { ${thread.run} }
 `;
 const isThread = `(await import('node:worker_threads')).parentPort.listenerCount('message') === 0`;

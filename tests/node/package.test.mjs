@@ -55,6 +55,15 @@ test('a thread has its glue by a static import, because Parcel finds it in no ot
   }
 });
 
+test('the glue imports nothing: WebKit runs the script of a worker once more if anything imports it', () => {
+  for (const build of ['single', 'threads']) {
+    assert.doesNotMatch(
+      readFileSync(join(home, 'dist', build, 'bilinormal.js'), 'utf8'),
+      /\b(import|from)\b *["'`{(*]/,
+    );
+  }
+});
+
 test('importing does nothing, and a process that is done ends without a word', () => {
   const idle = node(`
     import * as everything from 'bilinormal';
