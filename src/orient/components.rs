@@ -29,7 +29,7 @@ impl Components {
     }
 }
 
-/// One surface in itself: what is not linked to any other.
+/// One surface in itself: what is not linked to any other, but for a few points here and there, which go with the nearest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Component {
     /// Points of it.

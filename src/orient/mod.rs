@@ -5,7 +5,8 @@
 //! are open to the air says which way is out ([`air`]), and the signs are chosen that these agree with best ([`groups`]), of
 //! open surfaces also what their parts see of each other ([`looks`]). These then face what stands before them ([`facing`]), or the
 //! scanner, if one saw all: where it stood, if densities tell that ([`station`]), or the direction from which it did ([`view`]).
-//! Of a few points that are no surface what is round them tells the side ([`specks`]). In noise normals then become means of those about them ([`means`]).
+//! Of a few points that are no surface, what is round them tells the side ([`specks`]). In noise normals then become means of
+//! those about them ([`means`]).
 
 mod air;
 mod ball;

@@ -45,7 +45,7 @@ pub(super) fn settle(
     stage: &Stage,
 ) -> Result<(), Error> {
     let surfaces = decisions.partition_point(|decision| decision.component.points >= LEAST_POINTS);
-    if surfaces == decisions.len() {
+    if surfaces == 0 || surfaces == decisions.len() {
         return Ok(());
     }
     let is_speck = |patch: usize| signs.component[patch] as usize >= surfaces;
