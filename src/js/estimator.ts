@@ -238,13 +238,15 @@ export function openEstimator(
         const kind = kindOf(positions);
         want(/^Float(32|64)Array$/.test(kind), 'positions', positions, 'a Float32Array or Float64Array');
         countOf(positions);
+        const { transfer = false } = options;
+        want(typeof transfer === 'boolean', 'transfer', transfer, 'true or false');
         const copied = values.split(', ').map((name) => [name, copy(name, options[name as keyof EstimateOptions])]);
         const call = (part: Part, take?: boolean): Call => ({
           kind: 'estimate',
           data: [own(part, take), kind > 'Float5', Object.fromEntries(copied)],
         });
         // A buffer is not taken before the worker has tried the options, without points.
-        return options.transfer
+        return transfer
           ? [call({ buffer: positions.buffer, byteLength: 0 }), () => call(positions, true)]
           : [call(positions)];
       }),

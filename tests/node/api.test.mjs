@@ -493,6 +493,7 @@ test('wrong arguments are input errors that say what came and what was wanted', 
     ],
     [() => estimateNormals(positions, { method: 'knn', k: 1e10 }), /k is 10000000000; wanted .* to 4294967295/],
     [() => estimateNormals(positions, { curvature: 1 }), /curvature is 1; wanted true or false/],
+    [() => estimateNormals(positions, { transfer: 'yes' }), /transfer is 'yes'; wanted true or false/],
     [() => createEstimator({ memoryMaxMiB: 5000 }), /memoryMaxMiB is 5000; wanted 16 to 4096/],
     [() => createEstimator(null), /options is null; wanted an object/],
     // What JavaScript itself finds wrong.
