@@ -157,8 +157,11 @@ pub(super) fn thinning(spots: &[Spot], place: DVec3, least_cosine: f64) -> Thinn
     })
 }
 
-/// The share of the variance of densities that a place explains, by the inverse square and the cosine themselves.
+/// The share of the variance of densities that a place explains, by the inverse square and the cosine themselves: nothing where
+/// hardly any varies, as that of one spot.
 pub(super) fn explained(spots: &[Spot], place: DVec3) -> f64 {
+    /// Of logarithms to base 2: less is rounding.
+    const LEAST_VARIANCE: f64 = 1e-6;
     let variance = |density: &dyn Fn(&Spot) -> f64| {
         let (mut sum, mut squares, mut all) = (0.0, 0.0, 0.0);
         for spot in spots.iter().filter(|spot| Ray::between(spot, place).cosine.abs() >= FACING) {
@@ -167,9 +170,14 @@ pub(super) fn explained(spots: &[Spot], place: DVec3) -> f64 {
             squares += spot.weight * density * density;
             all += spot.weight;
         }
-        squares - sum * sum / all
+        (squares - sum * sum / all) / all
     };
-    1.0 - variance(&|spot| spot.density - Ray::between(spot, place).density()) / variance(&|spot| spot.density)
+    let known = variance(&|spot| spot.density);
+    if known > LEAST_VARIANCE {
+        1.0 - variance(&|spot| spot.density - Ray::between(spot, place).density()) / known
+    } else {
+        0.0
+    }
 }
 
 /// The share of the variance of densities that the normals of surfaces explain, turned to a place: by their harmonics up to the
@@ -334,5 +342,14 @@ pub(super) mod tests {
         assert!(towards.dot(beside.normalize()) > 0.95 && explained > 0.8, "{towards} {explained}");
         let (_, explained) = growth(&walls(|place, _| 1.0 + (100.0 * place.x + 70.0 * place.y).sin().abs()));
         assert!(explained < 0.1, "{explained}");
+    }
+
+    #[test]
+    fn one_density_explains_nothing() {
+        for count in [1, 3] {
+            let spots: Vec<Spot> =
+                (0..count).map(|i| spot(DVec3::new(f64::from(i), 0.0, 0.1), DVec3::Z, 7.0)).collect();
+            assert_eq!(explained(&spots, DVec3::new(0.0, 0.0, 5.0)), 0.0);
+        }
     }
 }
