@@ -3,14 +3,14 @@
 use crate::bricks::{Bricks, OUTSIDE, set_bits};
 use crate::error::Error;
 use crate::lanes::transposed;
-use crate::lattice::{cube_centre, octant_in_brick};
+use crate::lattice::{BRICK, cube_centre, octant_in_brick};
 use crate::lists::reserve;
 use crate::parallel::{self, Filling, Scatter};
 use crate::points::CHUNK;
 use crate::progress::Stage;
 use crate::source::Source;
 use bytemuck::{Pod, Zeroable};
-use glam::{Vec3, Vec4};
+use glam::{DVec3, Vec3, Vec4};
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -112,6 +112,13 @@ impl Grid {
     pub fn points_of(&self, cube: usize) -> Range<usize> {
         let start = if cube == 0 { 0 } else { self.cube_end[cube - 1] };
         start as usize..self.cube_end[cube] as usize
+    }
+
+    /// The occupied cubes of a brick: the middle of each, in edges, its number, and its bit in the mask.
+    pub fn centres_of(&self, brick: usize) -> impl Iterator<Item = (DVec3, usize, u32)> {
+        let corner = (BRICK * self.bricks.places[brick]).as_dvec3();
+        let cubes = set_bits(self.masks[brick]).zip(self.first_cube[brick] as usize..);
+        cubes.map(move |(bit, cube)| (corner + cube_centre(bit).as_dvec3(), cube, bit))
     }
 
     /// Calls `work(brick, cube, its bit in the mask)` for every cube, in parallel.

@@ -3,13 +3,12 @@
 use super::components::Decision;
 use super::patches::{Patches, signed};
 use super::signs::Signs;
-use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
-use crate::lattice::{BRICK, cube_centre};
+use crate::lattice::BRICK;
 use crate::lists::{filled, grow, reserve};
 use crate::progress::Stage;
-use glam::{IVec3, Vec3};
+use glam::{DVec3, IVec3, Vec3};
 use std::cmp::Reverse;
 use std::mem::replace;
 
@@ -51,11 +50,11 @@ pub(super) fn settle(
     let is_speck = |patch: usize| signs.component[patch] as usize >= surfaces;
     let told = stage.collect(grid.blocks.len(), WHAT, &|block| {
         let mut told = Vec::new();
-        for (brick, cube, bit) in grid.cubes_in(block) {
+        for (centre, cube, _) in grid.blocks[block].clone().flat_map(|brick| grid.centres_of(brick)) {
             for patch in patches.of_cube(cube).filter(|&patch| is_speck(patch)) {
-                let here = cube_centre(bit) + patches.all[patch].centre;
+                let here = centre + patches.all[patch].centre.as_dvec3();
                 grow(&mut told, 1, WHAT)?;
-                told.extend(ask_around(grid, patches, signs, patch, (brick, here), &is_speck));
+                told.extend(ask_around(grid, patches, signs, patch, here, &is_speck));
             }
         }
         Ok(told)
@@ -65,9 +64,11 @@ pub(super) fn settle(
         signs.flipped[patch] = is_flipped;
         let points = u64::from(patches.all[patch].points);
         let from = &mut decisions[before as usize];
-        (from.component.points, from.patches) = (from.component.points - points, from.patches - 1);
+        from.component.points -= points;
+        from.patches -= 1;
         let to = &mut decisions[component as usize];
-        (to.component.points, to.patches) = (to.component.points + points, to.patches + 1);
+        to.component.points += points;
+        to.patches += 1;
     }
     number(signs, decisions)
 }
@@ -81,12 +82,12 @@ fn ask_around(
     patches: &Patches,
     signs: &Signs,
     patch: usize,
-    place: (usize, Vec3),
+    here: DVec3,
     is_speck: &dyn Fn(usize) -> bool,
 ) -> Option<Told> {
     let normal = patches.all[patch].normal;
     let (mut agreement, mut nearest) = (0.0, None);
-    each_around(grid, patches, place, |other, line| {
+    each_around(grid, patches, here, |other, line| {
         let square = line.length_squared() + SOFT;
         if square > REACH * REACH || is_speck(other) {
             return;
@@ -101,19 +102,16 @@ fn ask_around(
     nearest.map(|(_, component)| Told { patch, is_flipped: agreement < 0.0, component })
 }
 
-/// Calls `each` with the patches of all bricks within [`REACH`] of a place in a brick, and how far they are from it, in edges.
-fn each_around(grid: &Grid, patches: &Patches, (brick, here): (usize, Vec3), mut each: impl FnMut(usize, Vec3)) {
-    let edge = BRICK as f32;
-    let [first, last] = [-REACH, REACH].map(|reach| ((here + reach) / edge).floor().as_ivec3());
+/// Calls `each` with the patches of all bricks within [`REACH`] of a place, and how far they are from it, in edges.
+fn each_around(grid: &Grid, patches: &Patches, here: DVec3, mut each: impl FnMut(usize, Vec3)) {
+    let brick = |reach: f32| ((here + f64::from(reach)) / f64::from(BRICK)).floor().as_ivec3();
+    let (first, last) = (brick(-REACH), brick(REACH));
     let along = |axis: usize| first[axis]..=last[axis];
-    let steps = along(2).flat_map(|z| along(1).flat_map(move |y| along(0).map(move |x| IVec3::new(x, y, z))));
-    for step in steps {
-        let Some(near) = grid.bricks.number(grid.bricks.places[brick] + step) else { continue };
-        let (near, corner) = (near as usize, edge * step.as_vec3() - here);
-        for (bit, cube) in set_bits(grid.masks[near]).zip(grid.first_cube[near] as usize..) {
-            let centre = corner + cube_centre(bit);
-            patches.of_cube(cube).for_each(|patch| each(patch, centre + patches.all[patch].centre));
-        }
+    let places = along(2).flat_map(|z| along(1).flat_map(move |y| along(0).map(move |x| IVec3::new(x, y, z))));
+    let bricks = places.filter_map(|place| grid.bricks.number(place));
+    for (centre, cube, _) in bricks.flat_map(|brick| grid.centres_of(brick as usize)) {
+        let line = (centre - here).as_vec3();
+        patches.of_cube(cube).for_each(|patch| each(patch, line + patches.all[patch].centre));
     }
 }
 

@@ -2,10 +2,8 @@
 
 use super::ball::Ball;
 use super::patches::{Patch, Patches};
-use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
-use crate::lattice::{BRICK, cube_centre};
 use crate::lists::grow;
 use crate::points::spread;
 use crate::power::log2;
@@ -44,13 +42,6 @@ pub(super) fn some_bricks<'a>(ball: &'a Ball, grid: &'a Grid) -> impl Iterator<I
     all.filter_map(move |(i, brick)| some.next_if_eq(&i).map(|_| brick))
 }
 
-/// The occupied cubes of a brick: the middle of each, in edges, its number, and its bit.
-pub(super) fn cubes_of(grid: &Grid, brick: usize) -> impl Iterator<Item = (DVec3, usize, u32)> {
-    let corner = (BRICK * grid.bricks.places[brick]).as_dvec3();
-    let cubes = set_bits(grid.masks[brick]).zip(grid.first_cube[brick] as usize..);
-    cubes.map(move |(bit, cube)| (corner + cube_centre(bit).as_dvec3(), cube, bit))
-}
-
 /// Those of some bricks.
 pub(super) fn spots(ball: &Ball, grid: &Grid, patches: &Patches, what: &'static str) -> Result<Vec<Spot>, Error> {
     let mut spots = Vec::new();
@@ -59,7 +50,7 @@ pub(super) fn spots(ball: &Ball, grid: &Grid, patches: &Patches, what: &'static 
         spots.extend((0..8).filter_map(|octant| {
             let is_in_it = |&(_, _, bit): &(DVec3, usize, u32)| bit >> 1 & 1 | bit >> 2 & 2 | bit >> 3 & 4 == octant;
             spot(|| {
-                let cubes = cubes_of(grid, brick).filter(is_in_it);
+                let cubes = grid.centres_of(brick).filter(is_in_it);
                 cubes.flat_map(|(centre, cube, _)| {
                     patches.all[patches.of_cube(cube)].iter().map(move |one| (one, centre))
                 })

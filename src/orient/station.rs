@@ -5,7 +5,7 @@ use super::components::{Decision, Side};
 use super::patches::{Patch, Patches, signed};
 use super::place::{FACING, Place, explained, explained_by_normals, growth, thinning};
 use super::signs::Signs;
-use super::spots::{Spot, cubes_of, some_bricks, spots};
+use super::spots::{Spot, some_bricks, spots};
 use super::thinning::Thinning;
 use crate::error::Error;
 use crate::grid::Grid;
@@ -196,7 +196,7 @@ impl Candidate {
 /// Near the scanner, if it is a scan: of points at the same angles from each other the mean, where the near ones count more.
 fn middle(ball: &Ball, grid: &Grid) -> DVec3 {
     let (mut sum, mut all) = (DVec3::ZERO, 0.0);
-    for (place, cube, _) in ball.bricks(grid).flat_map(|brick| cubes_of(grid, brick)) {
+    for (place, cube, _) in ball.bricks(grid).flat_map(|brick| grid.centres_of(brick)) {
         let points = grid.points_of(cube).len() as f64;
         let weight = points * points.sqrt();
         sum += weight * place;
@@ -228,7 +228,7 @@ struct Sample {
 /// The patches of some bricks.
 fn samples(ball: &Ball, grid: &Grid, patches: &Patches, signs: &Signs) -> Result<Vec<Sample>, Error> {
     let mut samples = Vec::new();
-    for (centre, cube, _) in some_bricks(ball, grid).flat_map(|brick| cubes_of(grid, brick)) {
+    for (centre, cube, _) in some_bricks(ball, grid).flat_map(|brick| grid.centres_of(brick)) {
         let own = patches.of_cube(cube);
         grow(&mut samples, own.len(), WHAT)?;
         samples.extend(own.map(|number| {
