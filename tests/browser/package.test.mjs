@@ -201,7 +201,11 @@ test('a bundle by Vite, with its default settings, on the own origin and on anot
   writeFileSync(join(folder, 'main.js'), `import * as bilinormal from 'bilinormal'; window.bilinormal = bilinormal;`);
   await build({ root: folder, logLevel: 'error' });
   const scripts = readdirSync(join(folder, 'dist', 'assets')).filter((name) => name.endsWith('.js'));
-  for (const kind of ['worker-', 'thread-']) assert.ok(scripts.some((name) => name.startsWith(kind)), `no ${kind}`);
+  for (const kind of ['worker-', 'thread-'])
+    assert.ok(
+      scripts.some((name) => name.startsWith(kind)),
+      `no ${kind}`,
+    );
   for (const name of scripts) {
     // WebKit would run that once more, and all that the worker knows would be gone.
     const script = readFileSync(join(folder, 'dist', 'assets', name), 'utf8');
