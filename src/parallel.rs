@@ -4,9 +4,9 @@
 //! in the order of the tasks, so nothing depends on the number of threads.
 
 use crate::error::Error;
-use crate::lists::reserve;
+use std::alloc::Layout;
 use std::marker::PhantomData;
-use std::mem::MaybeUninit;
+use std::mem::{ManuallyDrop, MaybeUninit};
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
@@ -102,22 +102,21 @@ impl<T> Gathering<T> {
 /// A list that tasks fill, each item once and in any order. Not zeroed before: that would be a pass over the memory by
 /// one thread, a tenth of the time of an estimate.
 pub(crate) struct Filling<T> {
-    /// Its length stays zero until all items are written.
-    items: Vec<T>,
+    /// Memory for `length` items, as a `Vec` would take it.
     start: *mut T,
     length: usize,
 }
 
 // SAFETY: as for `Scatter`.
 unsafe impl<T: Send> Sync for Filling<T> {}
+// SAFETY: it owns its memory, as a `Vec` does.
+unsafe impl<T: Send> Send for Filling<T> {}
 
 impl<T: Copy> Filling<T> {
     /// Takes the memory, or says how much was needed.
-    #[inline(never)]
+    #[inline]
     pub fn new(length: usize, what: &str) -> Result<Self, Error> {
-        let mut items = Vec::new();
-        reserve(&mut items, length, what)?;
-        Ok(Self { start: items.as_mut_ptr(), items, length })
+        Ok(Self { start: room(Layout::new::<T>(), length, what)?.cast(), length })
     }
 
     /// Some items in a row, to be written; panics beyond the end.
@@ -147,9 +146,29 @@ impl<T: Copy> Filling<T> {
     ///
     /// # Safety
     /// Every item must have been written.
-    pub unsafe fn complete(mut self) -> Vec<T> {
-        // SAFETY: within the capacity; all items are written by the caller's promise.
-        unsafe { self.items.set_len(self.length) };
-        self.items
+    pub unsafe fn complete(self) -> Vec<T> {
+        let Self { start, length } = *ManuallyDrop::new(self);
+        // SAFETY: taken for so many items; all are written by the caller's promise.
+        unsafe { Vec::from_raw_parts(start, length, length) }
     }
+}
+
+impl<T> Drop for Filling<T> {
+    fn drop(&mut self) {
+        // SAFETY: taken for so many items, of which none has to be dropped.
+        drop(unsafe { Vec::from_raw_parts(self.start, 0, self.length) });
+    }
+}
+
+/// Memory for `count` items, as a `Vec` would take it. Not generic: the size of the module is what a page waits for.
+#[inline(never)]
+fn room(item: Layout, count: usize, what: &str) -> Result<*mut u8, Error> {
+    let size = (item.size() as u64).saturating_mul(count as u64);
+    let start = match isize::try_from(size) {
+        Ok(0) => std::ptr::without_provenance_mut(item.align()),
+        // SAFETY: not empty, and the alignment is that of a type.
+        Ok(size) => unsafe { std::alloc::alloc(Layout::from_size_align_unchecked(size as usize, item.align())) },
+        Err(_) => std::ptr::null_mut(),
+    };
+    if start.is_null() { Err(Error::memory(what, size)) } else { Ok(start) }
 }

@@ -225,7 +225,11 @@ impl<'a> Cursor<'a> {
         let Some(token) = ahead.token() else {
             return self.miscounted(element);
         };
-        let hint = if token.contains(&b',') { "; wanted a decimal point, and blanks between values" } else { "" };
+        let hint = if token.iter().any(|byte| *byte == b',') {
+            "; wanted a decimal point, and blanks between values"
+        } else {
+            ""
+        };
         self.error(message!["'", shorten(token), "' is not a number", hint])
     }
 

@@ -31,22 +31,15 @@ impl Buffer {
     /// the buffer over: they are not zeroed, which would cost as much as to write them.
     #[wasm_bindgen(constructor)]
     pub fn new(byte_length: f64) -> Result<Buffer, JsValue> {
-        if !(byte_length >= 0.0 && byte_length.fract() == 0.0 && byte_length <= u64::MAX as f64) {
-            let message =
-                message!["byteLength is ", number::text(byte_length), "; wanted a whole number of at least 0"];
-            return Err(Error::Input(message).into());
-        }
-        let too_large = Error::memory("the data", byte_length as u64);
-        let Some(words) = u32::try_from(byte_length as u64).ok().map(|bytes| bytes.div_ceil(4) as usize) else {
-            return Err(too_large.into());
-        };
-        let byte_length = byte_length as usize;
+        let bytes = byte_length as u64;
+        // What is too large for an address is too large for memory.
+        let words = usize::try_from(bytes.div_ceil(4)).unwrap_or(usize::MAX);
         let mut floats = Vec::new();
-        floats.try_reserve_exact(words).map_err(|_| too_large)?;
+        floats.try_reserve_exact(words).map_err(|_| Error::memory("the data", bytes))?;
         // SAFETY: within the capacity. All bits are floats, and JavaScript, to which the pointer goes, writes them before Rust
         // reads any.
         unsafe { floats.set_len(words) };
-        Ok(Self { storage: Storage::Floats(floats), byte_length })
+        Ok(Self { storage: Storage::Floats(floats), byte_length: bytes as usize })
     }
 
     /// Where the bytes begin in the module's memory.
