@@ -117,7 +117,7 @@ fn run(points: Points, options: &Options, progress: &Progress) -> Result<Estimat
         Orient::Viewpoint(_) | Orient::Up(_) => 0.97,
         Orient::Consistent | Orient::Outward => 0.8,
     };
-    let first = progress.first(share);
+    let first = progress.part(0.0..share);
     let mut laps = Laps::start(&first);
 
     first.update("bounds", 0.0)?;
@@ -148,7 +148,7 @@ fn run(points: Points, options: &Options, progress: &Progress) -> Result<Estimat
             baseline(points, &cloud, options, Baseline::Egg { k: options.k.unwrap_or(8) as usize }, laps)
         }
     }?;
-    if options.orient != Orient::None {
+    if !matches!(options.orient, Orient::None) {
         let mut laps = Laps::start(progress);
         let normals = bytemuck::cast_slice_mut(&mut estimate.normals);
         let stage = progress.stage("orientation", share..1.0);

@@ -13,25 +13,27 @@ type Observer<'a> = dyn Fn(&'static str, f64) -> ControlFlow<()> + 'a;
 pub struct Progress<'a> {
     observer: &'a Observer<'a>,
     clock: &'a dyn Fn() -> f64,
-    /// The share of the whole call that is told of.
+    /// The share of the whole call that is told of, and where it begins.
     share: f64,
+    begin: f64,
 }
 
 impl<'a> Progress<'a> {
     /// `observer(phase, fraction)` hears a fraction that rises from 0 to 1 over the whole call, and answers
     /// `Break` to stop it with [`Error::Cancelled`]; `clock()` is in milliseconds from any beginning.
     pub fn new(observer: &'a Observer<'a>, clock: &'a dyn Fn() -> f64) -> Self {
-        Self { observer, clock, share: 1.0 }
+        Self { observer, clock, share: 1.0, begin: 0.0 }
     }
 
     /// A `Progress` that nobody listens to. All times in the report are 0.
     pub fn silent() -> Progress<'static> {
-        Progress { observer: &|_, _| ControlFlow::Continue(()), clock: &|| 0.0, share: 1.0 }
+        Progress { observer: &|_, _| ControlFlow::Continue(()), clock: &|| 0.0, share: 1.0, begin: 0.0 }
     }
 
-    /// The same for a call of which all that comes is the first `share`.
-    pub(crate) fn first(&self, share: f64) -> Self {
-        Self { share: self.share * share, ..*self }
+    /// The same for a call of which all that comes is the part from `share.start` to `share.end`.
+    pub(crate) fn part(&self, share: Range<f64>) -> Self {
+        let begin = self.begin + self.share * share.start;
+        Self { share: self.share * (share.end - share.start), begin, ..*self }
     }
 
     /// The part of the call that goes from `share.start` to `share.end` of the whole.
@@ -41,7 +43,7 @@ impl<'a> Progress<'a> {
 
     /// Tells the observer that `phase` stands at `fraction` of the whole call.
     pub(crate) fn update(&self, phase: &'static str, fraction: f64) -> Result<(), Error> {
-        match (self.observer)(phase, self.share * fraction) {
+        match (self.observer)(phase, self.begin + self.share * fraction) {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Error::Cancelled),
         }

@@ -2,14 +2,45 @@
 
 mod reference;
 
-use bilinormal::ply::{self, Additions, Format, PointCloud, ReadOptions};
+use bilinormal::ply::{self, Additions, Format, Next, PointCloud, ReadOptions, Stream};
 use bilinormal::{Error, Place, Progress};
 use reference::Ply;
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 
+/// Reads a file as a whole, and makes sure that in pieces it is the same.
 fn read(file: impl AsRef<[u8]>) -> Result<PointCloud, Error> {
-    ply::read(file.as_ref(), &ReadOptions::default(), &Progress::silent())
+    let file = file.as_ref();
+    let whole = ply::read(file, &ReadOptions::default(), &Progress::silent());
+    let header = file.windows(10).position(|bytes| bytes == b"end_header").filter(|_| file.starts_with(b"ply\n"));
+    // All of the header and a little more, if it has an end; enough to tell what the file is; much.
+    for beginning in [header.map_or(512, |at| at + 13), 512, 512.max(file.len() / 2)].map(|bytes| bytes.min(file.len()))
+    {
+        let pieces = in_pieces(file.len() as u64, beginning, 1, |from, to| file[from as usize..to as usize].to_vec());
+        // As text, in which a number that is none equals itself.
+        assert_eq!(format!("{pieces:?}"), format!("{whole:?}"), "from {beginning} bytes");
+    }
+    whole
+}
+
+/// Reads what `bytes(from, to)` gives, some bytes first and then in pieces, `parts` times as many as are asked for.
+fn in_pieces(
+    length: u64,
+    beginning: usize,
+    parts: u64,
+    bytes: impl Fn(u64, u64) -> Vec<u8>,
+) -> Result<PointCloud, Error> {
+    let mut stream = Stream::new(length, ReadOptions::default());
+    let mut next = stream.take(&bytes(0, beginning as u64), &Progress::silent())?;
+    while let Next::Pieces { from, to, step } = next {
+        next = Next::Piece;
+        for at in (from..to).step_by((step / parts) as usize) {
+            assert_eq!(next, Next::Piece);
+            next = stream.take(&bytes(at, to.min(at + step / parts)), &Progress::silent())?;
+        }
+    }
+    let Next::Cloud(cloud) = next else { panic!("{next:?}") };
+    Ok(cloud)
 }
 
 fn write(file: impl AsRef<[u8]>, normals: &[f32], ascii: bool) -> Result<Vec<u8>, Error> {
@@ -318,6 +349,81 @@ fn far_doubles_come_relative_to_an_origin() {
 }
 
 /// Survey files often have doubles for east and north, and a single for the height.
+/// A row of doubles, padded: many bytes, few points.
+fn padded(count: usize) -> (Vec<u8>, usize) {
+    let mut properties = vec!["double x", "double y", "double z"];
+    properties.resize(1024, "double other");
+    let stride = 8 * properties.len();
+    let mut body = vec![0; count * stride];
+    for (i, row) in body.chunks_exact_mut(stride).enumerate() {
+        for (c, place) in [431_000.0, 5_412_000.0, 120.0].into_iter().enumerate() {
+            row[8 * c..8 * c + 8].copy_from_slice(&f64::to_le_bytes(place + (i * (c + 3)) as f64 % 17.25));
+        }
+    }
+    (file(LITTLE, count, &properties, &body), stride)
+}
+
+#[test]
+fn large_files_of_far_doubles_come_twice() {
+    // More than are gathered.
+    let (file, stride) = padded(20_000);
+    assert!(file.len() > 128 << 20);
+    let whole = ply::read(&file, &ReadOptions::default(), &Progress::silent()).unwrap();
+    assert_ne!(whole.origin, [0.0; 3]);
+    let most = RefCell::new(0);
+    // One row at a time, and as many as are asked for.
+    for parts in [1, (8 << 20) / stride as u64] {
+        let pieces = in_pieces(file.len() as u64, 1 << 16, parts, |from, to| {
+            let bytes = file[from as usize..to as usize].to_vec();
+            most.replace_with(|most| bytes.len().max(*most));
+            bytes
+        });
+        assert_eq!(pieces.unwrap(), whole);
+    }
+    assert!(*most.borrow() <= 8 << 20);
+}
+
+#[test]
+fn a_file_larger_than_memory_is_read_or_refused() {
+    let beginning = file(LITTLE, 700_000, &[&XYZ[..], &["double other"; 1024]].concat(), &[0; 12]);
+    let header = beginning.len() as u64 - 12;
+    let stride = 12 + 8 * 1024;
+    let length = header + 700_000 * stride;
+    assert!(length > 5 << 30);
+    // Each point says where in the file it stands.
+    let bytes = |from: u64, to: u64| {
+        let Some(first) = from.checked_sub(header) else { return beginning.clone() };
+        let mut rows = vec![0; (to - from) as usize];
+        for (i, row) in rows.chunks_exact_mut(stride as usize).enumerate() {
+            row[..4].copy_from_slice(&((first / stride + i as u64) as f32).to_le_bytes());
+        }
+        rows
+    };
+    let cloud = in_pieces(length, beginning.len(), 1, bytes).unwrap();
+    assert!(cloud.positions.chunks_exact(3).enumerate().all(|(i, p)| p == [i as f32, 0.0, 0.0]));
+    assert_eq!(cloud.properties.len(), 1027);
+
+    // Cut short, too, and before any of it is read.
+    let mut stream = Stream::new(length - 1, ReadOptions::default());
+    match stream.take(&beginning, &Progress::silent()) {
+        Err(Error::Format { message, place }) => {
+            assert_eq!(message, "the file ends after 699999 of 700000 rows of element vertex");
+            assert_eq!(place, Some(Place::Byte(length - stride)));
+        }
+        other => panic!("{other:?}"),
+    }
+    // Other files are told by their beginning, not by what they would take.
+    let mut stream = Stream::new(1 << 60, ReadOptions::default());
+    assert!(matches!(stream.take(b"LASF", &Progress::silent()), Err(Error::Format { .. })));
+    // What has to be there as a whole, and does not fit.
+    let text = file(TEXT, 3, &XYZ, b"");
+    let mut stream = Stream::new(1 << 60, ReadOptions::default());
+    match stream.take(&text, &Progress::silent()) {
+        Err(Error::Limit { needed, .. }) => assert_eq!(needed, 1 << 60),
+        other => panic!("{other:?}"),
+    }
+}
+
 #[test]
 fn far_coordinates_of_mixed_types_come_relative_to_one_origin() {
     let coordinates = |i: usize| [431_000.125 + i as f64, 4_580_000.0 + i as f64, 512.5 + i as f64 * 0.25];

@@ -4,7 +4,7 @@
 mod reference;
 
 use crate::{Random, call, peak_of};
-use bilinormal::ply::{self, Additions, Format, PointCloud, ReadOptions};
+use bilinormal::ply::{self, Additions, Format, Next, PointCloud, ReadOptions, Stream};
 use bilinormal::{Error, Progress};
 use reference::{Element, Ply};
 
@@ -51,6 +51,10 @@ pub fn read(file: &[u8]) -> Result<PointCloud, Error> {
     };
     let (cloud, peak) = peak_of(|| call(&all, random.bits(), is_same));
     assert_fits(peak, file.len());
+    match (&cloud, in_pieces(file, 512 + random.bits() as usize % 4096)) {
+        (Ok(cloud), Ok(pieces)) => assert!(is_same(cloud, &pieces)),
+        (whole, pieces) => assert_eq!(whole.as_ref().err(), pieces.err().as_ref()),
+    }
     let cloud = match cloud {
         Err(error @ Error::Format { .. }) => {
             assert!(error.to_string().len() < 4000, "{error}");
@@ -67,6 +71,19 @@ pub fn read(file: &[u8]) -> Result<PointCloud, Error> {
     let most = |most| ply::read(file, &ReadOptions { max_points: Some(most) }, &Progress::silent());
     assert!(is_same(&most(count as u64).unwrap(), &cloud));
     assert!(count == 0 || matches!(most(count as u64 - 1), Err(Error::Input(_))));
+    Ok(cloud)
+}
+
+/// Reads a file in the pieces that are asked for, after its beginning.
+fn in_pieces(file: &[u8], beginning: usize) -> Result<PointCloud, Error> {
+    let mut stream = Stream::new(file.len() as u64, ReadOptions::default());
+    let mut next = stream.take(&file[..beginning.min(file.len())], &Progress::silent())?;
+    while let Next::Pieces { from, to, step } = next {
+        for piece in file[from as usize..to as usize].chunks(step as usize) {
+            next = stream.take(piece, &Progress::silent())?;
+        }
+    }
+    let Next::Cloud(cloud) = next else { panic!("{next:?}") };
     Ok(cloud)
 }
 

@@ -8,11 +8,14 @@ import type { EstimateOptions, Estimator, EstimatorOptions, Positions, ReadOptio
 /** What an estimator needs from where it runs. */
 export interface Host {
   startWorker: StartWorker;
-  /** Whether addresses of local files can be opened. */
-  files: boolean;
+  /** The length of a local file; there where addresses of local files can be opened. */
+  size?(source: unknown): number | undefined;
   /** What relative addresses count from. */
   base(): string;
 }
+
+/** Files that are larger are streamed: memory is for their points alone. */
+const largeBytes = 3e8;
 
 interface Job {
   call: Call;
@@ -251,11 +254,14 @@ export function openEstimator(
           : [call(positions)];
       }),
 
-    readPointCloud: (source, options = {}) =>
-      core.run(options, 'maxPoints', async (tell, stop) => {
-        const maxPoints = options.maxPoints && Number(options.maxPoints);
-        return [{ kind: 'readPly', data: [await resolve(source, host.files, tell, stop), maxPoints] }];
-      }),
+    readPointCloud: (source: any, options = {}) => {
+      const size = source?.size ?? host.size?.(source);
+      const streamed = size > largeBytes && size;
+      return (streamed ? full : core).run(options, 'maxPoints', async (tell, stop) => {
+        const maxPoints = Number(options.maxPoints ?? Infinity);
+        return [{ kind: 'readPly', data: [await resolve(source, host.size, tell, stop), maxPoints, streamed] }];
+      });
+    },
 
     writePly: (cloud, add, options = {}) =>
       full.run(options, 'format', async (tell, stop) => {
@@ -267,9 +273,7 @@ export function openEstimator(
         const curvature = pack('curvature', add.curvature);
         const normals = pack('normals', add.normals);
         if (!(Object(cloud) === cloud && 'positions' in cloud))
-          return [
-            { kind: 'writePly', data: [await resolve(cloud, host.files, tell, stop), normals, curvature, ascii] },
-          ];
+          return [{ kind: 'writePly', data: [await resolve(cloud, host.size, tell, stop), normals, curvature, ascii] }];
         const positions = pack('positions', cloud.positions ?? null)!;
         const count = countOf(cloud.positions);
         want((cloud.count ?? count) === count, 'count', cloud.count, `${count}, that of positions`);

@@ -10,12 +10,13 @@ export interface Failure extends ErrorDetails {
 }
 
 /** An error of the worker's own; the calling thread makes a BilinormalError of it. */
-export const coded = (code: ErrorCode, message: string) => Object.assign(new Error(message), { code });
+export const coded = (code: ErrorCode, message: string, more?: Partial<Failure>) =>
+  Object.assign(new Error(message), { code }, more);
 
 /** Packs what was thrown, without what is undefined. */
 export function failure(error: unknown): Failure {
   const { code, message = String(error) } = error as Partial<Failure>;
   return /^(format|input|limit|unsupported)$/.test(code!)
-    ? JSON.parse(JSON.stringify(error, ['code', 'message', 'line', 'byte', 'needed', 'available']))
+    ? JSON.parse(JSON.stringify(error, ['code', 'message', 'line', 'byte', 'needed', 'available', 'fatal']))
     : { message };
 }

@@ -11,7 +11,6 @@ import { starter } from './link.js';
 
 const api = /* @__PURE__ */ makeApi({
   startWorker: starter(() => new Worker(new URL('./worker.js', import.meta.url), { type: 'module' })),
-  files: false,
   base: () => globalThis.document?.baseURI ?? location.href,
 });
 

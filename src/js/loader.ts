@@ -9,8 +9,6 @@ export interface Platform {
   processors: number;
   startThread: StartWorker;
   load(url: URL): Promise<ArrayBuffer>;
-  /** Opens a local file by its address, where there are such. */
-  open?(url: string): { size: number; slice(from: number, to: number): { arrayBuffer(): Promise<ArrayBuffer> } };
 }
 
 export interface Loaded {

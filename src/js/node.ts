@@ -1,4 +1,5 @@
 // The entry for Node: the same package on worker threads. Its types are those of index.ts.
+import { statSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
 import { Worker } from 'node:worker_threads';
 import { makeApi } from './api.js';
@@ -8,7 +9,14 @@ export const { estimateNormals, readPointCloud, writePly, createEstimator, featu
   // Options of the process, such as a loader of its tests, are not for the worker.
   startWorker: (receive, fail) =>
     link(new Worker(new URL('./worker-node.js', import.meta.url), { execArgv: [] }), receive, fail),
-  files: true,
+  size(source) {
+    try {
+      return statSync(source as URL).size;
+    } catch {
+      // Told when it is opened.
+      return undefined;
+    }
+  },
   base: () => pathToFileURL('./').href,
 });
 

@@ -14,6 +14,12 @@ export interface Link {
 /** Starts a worker. `fail` hears what goes wrong in it as a whole, and why, but for a script that did not load. */
 export type StartWorker = (receive: (message: any) => void, fail: (reason?: string) => void) => Link;
 
+/** What is needed of a Blob. */
+export interface OpenFile {
+  readonly size: number;
+  slice(from: number, to: number): { arrayBuffer(): Promise<ArrayBuffer> };
+}
+
 /** Bytes on their way into wasm memory: a Blob to be streamed, bytes to be copied, or the address of a local file. */
 export type Bytes = Blob | Uint8Array | string;
 
@@ -32,7 +38,8 @@ export interface Start extends EstimatorOptions {
 export type Call =
   | { kind: 'hello'; data: [] }
   | { kind: 'estimate'; data: [positions: Uint8Array<ArrayBuffer>, double: boolean, options: { orient?: any }] }
-  | { kind: 'readPly'; data: [file: Bytes, maxPoints: number | undefined] }
+  /** With `size`, that of the file, it is read in pieces. */
+  | { kind: 'readPly'; data: [file: any, maxPoints: number, size: number] }
   | { kind: 'writePly'; data: [file: Bytes, normals: Part, curvature: Part, ascii: boolean] }
   | {
       kind: 'writeCloud';

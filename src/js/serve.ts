@@ -1,8 +1,8 @@
 // The worker's side: takes one call after the other into wasm and hands results out.
 import { coded, failure } from './failure.js';
 import { load, type Loaded, type Platform } from './loader.js';
-import type { Call, Reply, Start } from './protocol.js';
-import type { Buffer, Tell } from './wasm.js';
+import type { Call, OpenFile, Reply, Start } from './protocol.js';
+import type { Buffer, Pieces, Tell } from './wasm.js';
 
 /** Blobs are read in pieces of this size, so that a file is never whole in JavaScript memory. */
 const pieceBytes = 1 << 23;
@@ -30,13 +30,14 @@ export function serve(post: (reply: Reply) => void, platform: Platform) {
     try {
       const wasm = await loaded;
       started = true;
-      post({ data: await answer(message, wasm, platform, tell) });
+      post({ data: await answer(message, wasm, tell) });
     } catch (error) {
       const packed = failure(error);
       // What fails before anything runs is a script or a module that did not load.
       if (!started) packed.code ??= 'unsupported';
       // After a limit a new worker begins with empty memory; wasm memory never shrinks.
-      post({ failure: { ...packed, fatal: !started || packed.code === 'limit' } });
+      packed.fatal ||= !started || packed.code === 'limit';
+      post({ failure: packed });
     }
   };
 }
@@ -54,17 +55,34 @@ function refuse([{ buffer }, double, options]: Extract<Call, { kind: 'estimate' 
     if (Number.isFinite(coordinates[i]! + coordinates[i + 1]! + coordinates[i + 2]!)) needed += finiteBytes;
   }
   if (needed <= most) return;
-  const numbers = `at least ${needed} bytes needed, ${most} available`;
-  const message = `${points} points do not fit into memory; use fewer (${numbers})`;
-  throw Object.assign(coded('limit', message), { needed, available: most });
+  throw coded(
+    'limit',
+    `${points} points do not fit into memory; use fewer (at least ${needed} bytes needed, ${most} available)`,
+    { needed, available: most },
+  );
 }
 
-async function answer(
-  { kind, data }: Call,
-  { glue, memory, most, mode }: Loaded,
-  platform: Platform,
-  tell: Tell,
-): Promise<object> {
+/** Hands the bytes of a file over in pieces, one after the other, while the next ones load. */
+async function pour(file: OpenFile, { from, to, step }: Pieces, take: (piece: Uint8Array, at: number) => void) {
+  const ahead: Promise<any>[] = [];
+  for (let next = from; from < to; from += step) {
+    for (; next < to && ahead.length < piecesAhead; next += step) {
+      // An error is told when its turn comes.
+      ahead.push(
+        file
+          .slice(next, Math.min(to, next + step))
+          .arrayBuffer()
+          .catch((error) => error),
+      );
+    }
+    const piece = await ahead.shift();
+    // The worker goes, too, and with it what there is of the file.
+    if (piece.message) throw coded('input', `the file could not be read: ${piece.message}`, { fatal: true });
+    take(new Uint8Array(piece), from);
+  }
+}
+
+async function answer({ kind, data }: Call, { glue, memory, most, mode }: Loaded, tell: Tell): Promise<object> {
   if (kind === 'hello') return mode;
 
   // Made anew for each use: a view of memory that has grown since is empty.
@@ -72,36 +90,23 @@ async function answer(
   let hear = tell;
 
   /** Bytes as a buffer of wasm, also those of a file, which take half of the progress; all else as it is. */
-  async function put(part: unknown): Promise<unknown> {
-    let buffer: Buffer | undefined;
-    if (part instanceof Uint8Array) {
-      buffer = new glue.Buffer(part.byteLength);
-      view(buffer).set(part);
-      return buffer;
-    }
-    if (typeof part !== 'string' && !(part instanceof Blob)) return part;
+  async function put(part: any): Promise<unknown> {
+    if (part instanceof Uint8Array) return fill(part);
+    const size = part?.size;
+    if (!(size >= 0)) return part;
     hear = (phase, fraction) => tell(phase, (1 + fraction) / 2);
-    try {
-      const blob = part instanceof Blob ? part : platform.open!(part);
-      buffer = new glue.Buffer(blob.size);
-      const ahead: Promise<ArrayBuffer>[] = [];
-      for (let at = 0, next = 0; at < blob.size; at += pieceBytes) {
-        for (; next < blob.size && ahead.length < piecesAhead; next += pieceBytes) {
-          const piece = blob.slice(next, next + pieceBytes).arrayBuffer();
-          // Told when its turn comes.
-          piece.catch(() => {});
-          ahead.push(piece);
-        }
-        tell('load', at / blob.size / 2);
-        view(buffer).set(new Uint8Array((await ahead.shift())!), at);
-      }
-      return buffer;
-    } catch (error) {
-      // Without a buffer the file did not open, or memory does not suffice for it.
-      if (!buffer && failure(error).code) throw error;
-      buffer?.free();
-      throw coded('input', `the file could not be read: ${(error as Error).message}`);
-    }
+    const buffer = new glue.Buffer(size);
+    await pour(part, { from: 0, to: size, step: pieceBytes }, (bytes, at) => {
+      tell('load', at / size / 2);
+      view(buffer).set(bytes, at);
+    });
+    return buffer;
+  }
+
+  function fill(bytes: Uint8Array) {
+    const buffer = new glue.Buffer(bytes.byteLength);
+    view(buffer).set(bytes);
+    return buffer;
   }
 
   let used: Uint8Array | undefined;
@@ -110,10 +115,19 @@ async function answer(
     // The normals need just as much, and memory that is new to the system takes several times as long to write to.
     if (!data[1]) used = data[0];
   }
-  const parts: unknown[] = [];
-  // Not kept meanwhile: doubles are 24 bytes a point.
-  while (data.length > 0) parts.push(await put(data.shift()));
-  const found: any = (glue[kind] as any)(...parts, hear);
+  let found: any;
+  if (kind === 'readPly' && data[2]) {
+    const [file, ...options] = data;
+    // A large file, in the pieces that wasm asks for.
+    for (found = { from: 0, to: pieceBytes, step: pieceBytes }; found.step;) {
+      await pour(file, found, (bytes) => (found = glue.readPly(fill(bytes), ...options, tell) ?? found));
+    }
+  } else {
+    const parts: unknown[] = [];
+    // Not kept meanwhile: doubles are 24 bytes a point.
+    while (data.length) parts.push(await put(data.shift()));
+    found = (glue[kind] as any)(...parts, hear);
+  }
 
   if (found instanceof glue.Buffer) {
     // A file: out of wasm in pieces, so that it is never twice in memory.

@@ -39,10 +39,10 @@ export function own(from: Part, take?: boolean): Uint8Array<ArrayBuffer> {
   }
 }
 
-/** Turns a source into bytes, by a download if need be. `files`: whether addresses of local files can be opened. */
+/** Turns a source into bytes, by a download if need be. `files`: something if addresses of local files can be opened. */
 export async function resolve(
   source: any,
-  files: boolean,
+  files: unknown,
   tell: (phase: string, fraction: number) => void,
   signal: AbortSignal,
 ): Promise<Bytes> {

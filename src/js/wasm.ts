@@ -30,6 +30,13 @@ export interface Cloud {
   intensity?: Buffer;
 }
 
+/** The bytes of a file from one to another, in pieces of some length. */
+export interface Pieces {
+  from: number;
+  to: number;
+  step: number;
+}
+
 /** A build's exports. Calls consume the buffers they are given. */
 export interface Glue {
   default(options: {
@@ -40,7 +47,8 @@ export interface Glue {
   setMaximum(pages: number): void;
   Buffer: new (byteLength: number) => Buffer;
   estimate(positions: Buffer, double: boolean, options: object, tell: Tell): Estimation;
-  readPly(file: Buffer, maxPoints: number | undefined, tell: Tell): Cloud;
+  /** `file` is a piece of a file of `size` bytes, of which the answer asks for more, or all there is if `size` is 0. */
+  readPly(file: Buffer, maxPoints: number, size: number, tell: Tell): Pieces | Cloud | undefined;
   writePly(
     file: Buffer,
     normals: Buffer | undefined,

@@ -5,7 +5,9 @@ import { availableParallelism } from 'node:os';
 import { fileURLToPath } from 'node:url';
 import { Worker, parentPort } from 'node:worker_threads';
 import { buffersOf } from './buffers.js';
+import { coded } from './failure.js';
 import { link } from './node-link.js';
+import type { OpenFile } from './protocol.js';
 import { serve } from './serve.js';
 
 const port = parentPort!;
@@ -20,12 +22,15 @@ const receive = serve((reply) => port.postMessage(reply, buffersOf(reply)), {
     if (!response.ok) throw new Error(`HTTP status ${response.status}`);
     return response.arrayBuffer();
   },
-  open,
 });
-port.on('message', receive);
+port.on('message', (message) => {
+  // The address of a local file.
+  if (typeof message.data?.[0] === 'string') message.data[0] = open(message.data[0]);
+  receive(message);
+});
 
 /** A file as far as a Blob is needed; `openAsBlob` would be one, but Node warns that it is experimental. */
-function open(url: string) {
+function open(url: string): OpenFile {
   const path = fileURLToPath(url);
   const using = <T>(work: (file: number) => T): T => {
     const file = openSync(path, 'r');
@@ -35,12 +40,17 @@ function open(url: string) {
       closeSync(file);
     }
   };
-  const { size } = using((file) => fstatSync(file));
   return {
-    size,
+    get size() {
+      try {
+        return using((file) => fstatSync(file).size);
+      } catch (error) {
+        throw coded('input', `the file could not be read: ${(error as Error).message}`);
+      }
+    },
     slice: (from: number, to: number) => ({
       async arrayBuffer() {
-        const bytes = new Uint8Array(Math.min(to, size) - from);
+        const bytes = new Uint8Array(to - from);
         const read = using((file) => readSync(file, bytes, 0, bytes.length, from));
         if (read < bytes.length) throw new Error(`it is shorter than a moment ago: no more than ${from + read} bytes`);
         return bytes.buffer;

@@ -20,6 +20,8 @@ const PIECE: usize = 256 << 10;
 pub(super) struct Body<'a> {
     header: &'a Header<'a>,
     file: &'a [u8],
+    /// The length of the whole file.
+    length: u64,
     /// Where each element begins, and the last one ends: its row among all rows of text, or its byte in the file.
     starts: Vec<u64>,
     /// Of text.
@@ -62,54 +64,57 @@ impl<'a> Part<'a> {
 
 impl<'a> Body<'a> {
     /// Finds the elements. Costs one step for an element of fixed rows, one for every list in the others, and a pass over
-    /// text; takes no memory for rows.
+    /// text; takes no memory for rows. Of a file of `length` bytes `file` may be the beginning alone, header included, if it is
+    /// binary and without lists.
     #[optimize(size)]
-    pub fn locate(header: &'a Header<'a>, file: &'a [u8]) -> Result<Self, Error> {
-        let mut body = Self { header, file, starts: Vec::new(), pieces: Vec::new() };
+    pub fn locate(header: &'a Header<'a>, file: &'a [u8], length: u64) -> Result<Self, Error> {
+        let mut body = Self { header, file, length, starts: Vec::new(), pieces: Vec::new() };
         if Cursor::new(file, 0, header.format).is_text() {
             body.index_text()?;
             return Ok(body);
         }
-        let mut at = header.body;
+        let mut at = header.body as u64;
         for element in &header.elements {
-            body.starts.push(at as u64);
+            body.starts.push(at);
             at = body.end(element, at)?;
         }
-        body.starts.push(at as u64);
+        body.starts.push(at);
         Ok(body)
     }
 
     /// The end of a binary element.
-    fn end(&self, element: &Element, start: usize) -> Result<usize, Error> {
-        let there = self.file.len() - start;
-        let mut cursor = Cursor::new(self.file, start, self.header.format);
-        let ends = |rows: u64, at: usize| {
+    fn end(&self, element: &Element, start: u64) -> Result<u64, Error> {
+        let ends = |rows: u64, at: u64| {
             Error::format(
-                Some(Place::Byte(at as u64)),
+                Some(Place::Byte(at)),
                 message!["the file ends after ", rows, " of ", element.count, " rows of element ", element.label()],
             )
         };
         match element.stride() {
-            Some(0) => {}
+            Some(0) => Ok(start),
             Some(stride) => {
-                let rows = (there / stride) as u64;
-                if rows < element.count {
-                    return Err(ends(rows, start + rows as usize * stride));
-                }
-                cursor.at += element.count as usize * stride;
+                let (rows, stride) = ((self.length - start) / stride as u64, stride as u64);
+                let end = start + stride * rows.min(element.count);
+                if rows < element.count { Err(ends(rows, end)) } else { Ok(end) }
             }
             // Rows with a list have at least the byte of its length, so the file bounds this loop, whatever the count.
             None => {
+                let mut cursor = Cursor::new(self.file, start as usize, self.header.format);
                 for row in 0..element.count {
                     cursor.next_row();
-                    let begin = cursor.at;
+                    let begin = cursor.at as u64;
                     if let Err(error) = cursor.skip_row(element) {
                         return Err(if cursor.at > self.file.len() { ends(row, begin) } else { error });
                     }
                 }
+                Ok(cursor.at as u64)
             }
         }
-        Ok(cursor.at)
+    }
+
+    /// The byte of the file where an element of a binary one begins.
+    pub fn start(&self, index: usize) -> u64 {
+        self.starts[index]
     }
 
     /// Counts the rows of text and checks that there are enough.

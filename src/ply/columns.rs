@@ -126,7 +126,7 @@ pub(super) struct Arrays {
     colors: Filling<u8>,
     intensity: Filling<f32>,
     /// What the positions are seen from.
-    origin: DVec3,
+    pub origin: DVec3,
 }
 
 impl Arrays {

@@ -82,15 +82,20 @@ impl Element<'_> {
     }
 }
 
+/// Where a PLY file begins: at its first word, after a byte order mark; none if it is another file.
+pub(super) fn begin(file: &[u8]) -> Option<usize> {
+    let start = if file.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+    let magic = file.get(start..start + 3).is_some_and(|word| word.eq_ignore_ascii_case(b"ply"));
+    (magic && file.get(start + 3).is_none_or(u8::is_ascii_whitespace)).then_some(start)
+}
+
 impl<'a> Header<'a> {
     /// Reads the header at the beginning of `file`; the body is not looked at.
     #[optimize(size)]
     pub fn parse(file: &'a [u8]) -> Result<Self, Error> {
-        let start = if file.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
-        let magic = file.get(start..start + 3).is_some_and(|word| word.eq_ignore_ascii_case(b"ply"));
-        if !magic || file.get(start + 3).is_some_and(|byte| !byte.is_ascii_whitespace()) {
+        let Some(start) = begin(file) else {
             return Err(foreign(file));
-        }
+        };
         let mut lines = Lines { file, at: start, number: 0, end: line_end(file, start) };
         lines.next();
         let mut format = None;
@@ -167,6 +172,11 @@ impl<'a> Header<'a> {
 
     pub fn is_big_endian(&self) -> bool {
         self.format == Format::BinaryBigEndian
+    }
+
+    /// The bytes of every row of an element; none if rows are text, or differ in length because of lists.
+    pub fn stride(&self, element: usize) -> Option<usize> {
+        self.elements[element].stride().filter(|_| self.format != Format::Ascii)
     }
 
     /// The index of the element named `vertex`.

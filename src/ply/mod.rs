@@ -1,11 +1,12 @@
 //! Reading and writing PLY files.
 //!
-//! [`read`] gives a cloud; [`write()`] gives the file it came from, with normals; [`write_cloud`] makes a file from a
-//! cloud alone.
+//! [`read`] gives a cloud; [`Stream`] gives it from a file that comes in pieces; [`write()`] gives the file it came from,
+//! with normals; [`write_cloud`] makes a file from a cloud alone.
 //!
 //! ```text
-//! header ── body ── cursor ─┬─ reader ── columns ── PointCloud
-//!                           └─ writer ── sink ───── bytes
+//!                             ┌─ table ─┐
+//!   header ── body ── cursor ─┼─ reader ┴─ columns ── PointCloud
+//! stream ┘                    └─ writer ── sink ───── bytes
 //! ```
 //!
 //! Nothing in a file is trusted: counts are compared with the bytes that are there before memory is taken, and every
@@ -19,6 +20,9 @@ mod header;
 mod reader;
 mod scalar;
 mod sink;
+#[cfg(feature = "full")]
+mod stream;
+mod table;
 mod tasks;
 mod writer;
 
@@ -29,6 +33,8 @@ use std::borrow::Cow;
 
 pub use cloud::write_cloud;
 pub use reader::read;
+#[cfg(feature = "full")]
+pub use stream::{Next, Stream};
 pub use writer::write;
 
 /// What may be asked of [`read`].

@@ -1,19 +1,16 @@
 //! File bytes to a cloud.
 
 use super::body::{Body, Part};
-use super::columns::{self, Arrays, Column, Rows, Target};
+use super::columns::{self, Arrays, Column, Target};
 use super::header::{Element, Header, decode};
-use super::scalar::bits;
+use super::table::Table;
 use super::{PointCloud, ReadOptions, tasks};
 use crate::error::Error;
 use crate::message::message;
 use crate::parallel::{self, Scatter};
 use crate::points::{SAMPLE, choose_origin, spread_in};
-use crate::progress::Progress;
+use crate::progress::{Progress, Stage};
 use glam::DVec3;
-
-/// Points whose columns are read one after another while their bytes are in the nearest cache.
-const BLOCK: usize = 1 << 10;
 
 /// Reads the points of a PLY file.
 ///
@@ -35,6 +32,27 @@ const BLOCK: usize = 1 << 10;
 pub fn read(file: &[u8], options: &ReadOptions, progress: &Progress) -> Result<PointCloud, Error> {
     progress.update("read", 0.0)?;
     let header = Header::parse(file)?;
+    let (index, columns) = wanted(&header, options)?;
+    let vertex = &header.elements[index];
+    let body = Body::locate(&header, file, file.len() as u64)?;
+    // Fits: there are as many rows in the file.
+    let count = vertex.count as usize;
+    let stage = progress.stage("read", 0.0..1.0);
+    let (columns, arrays) = if let Some(stride) = header.stride(index) {
+        let mut table = Table::new(columns, stride, count, header.is_big_endian())?;
+        while !table.take(body.bytes(index), &stage)? {}
+        table.complete()
+    } else {
+        let arrays = Reader { vertex, columns: &columns, parts: &body.parts(index), count }.read(&stage)?;
+        (columns, arrays)
+    };
+    progress.update("read", 1.0)?;
+    // SAFETY: all rows were read, and one that lacks a value was refused.
+    Ok(unsafe { cloud(&header, index, &columns, arrays, viewpoint(&header, &body)) })
+}
+
+/// The index of the element with the points, if they are not too many, and what is read of them.
+pub(super) fn wanted(header: &Header, options: &ReadOptions) -> Result<(usize, Vec<Column>), Error> {
     let index = header.vertex()?;
     let vertex = &header.elements[index];
     let columns = columns::find(vertex)?.ok_or_else(|| header.without_position(vertex))?;
@@ -44,51 +62,43 @@ pub fn read(file: &[u8], options: &ReadOptions, progress: &Progress) -> Result<P
         let count = vertex.count;
         return Err(Error::Input(message!["the file declares ", count, " points; at most ", most, " were asked for"]));
     }
-    let body = Body::locate(&header, file)?;
-    let parts = body.parts(index);
-    // Fits: there are as many rows in the file.
-    let reader = Reader { vertex, columns: &columns, parts: &parts, count: vertex.count as usize };
-    // Rows without lists and words are read column by column.
-    let big_endian = header.is_big_endian();
-    let stride = vertex.stride().filter(|_| header.format != super::Format::Ascii);
-    let mut origin = DVec3::ZERO;
-    if columns::is_wide(&columns) {
-        origin = match stride {
-            Some(stride) => reader.origin_of_fixed(stride, big_endian),
-            None => reader.origin_of_any(),
-        };
-    }
-    let arrays = Arrays::new(&columns, reader.count, origin)?;
-    tasks::run(&progress.stage("read", 0.0..1.0), parts.len(), &|i| match stride {
-        Some(stride) => {
-            reader.read_fixed(&parts[i], stride, big_endian, &arrays);
-            Ok(())
-        }
-        None => reader.walk(&parts[i], 1, &mut |point, column, value| {
-            // SAFETY: parts share no point.
-            unsafe { arrays.store(point, column, value) };
-        }),
-    })?;
-    progress.update("read", 1.0)?;
-    // SAFETY: the parts hold all points, and a row that lacks a value was refused.
-    let (positions, normals, colors, intensity) = unsafe { arrays.complete() };
-    Ok(PointCloud {
-        positions,
-        origin: origin.to_array(),
-        normals: columns::has(&columns, Target::Normals).then_some(normals),
-        colors: columns::has(&columns, Target::Colors).then_some(colors),
-        intensity: columns::has(&columns, Target::Intensity).then_some(intensity),
-        format: header.format,
-        properties: vertex.properties.iter().map(|property| decode(property.name)).collect(),
-        comments: header.comments(),
-        viewpoint: viewpoint(&header, &body),
-    })
+    Ok((index, columns))
 }
+
+/// The cloud of arrays that are filled.
+///
+/// # Safety
+/// Each of the columns must have been stored for every point.
+pub(super) unsafe fn cloud(
+    header: &Header,
+    vertex: usize,
+    columns: &[Column],
+    arrays: Arrays,
+    viewpoint: Option<[f64; 3]>,
+) -> PointCloud {
+    let origin = arrays.origin.to_array();
+    // SAFETY: by the caller's promise.
+    let (positions, normals, colors, intensity) = unsafe { arrays.complete() };
+    PointCloud {
+        positions,
+        origin,
+        normals: columns::has(columns, Target::Normals).then_some(normals),
+        colors: columns::has(columns, Target::Colors).then_some(colors),
+        intensity: columns::has(columns, Target::Intensity).then_some(intensity),
+        format: header.format,
+        properties: header.elements[vertex].properties.iter().map(|property| decode(property.name)).collect(),
+        comments: header.comments(),
+        viewpoint,
+    }
+}
+
+/// The element that may tell where the scanner stood.
+pub(super) const CAMERA: &[u8] = b"camera";
 
 /// The place of the first camera.
 #[optimize(size)]
 fn viewpoint(header: &Header, body: &Body) -> Option<[f64; 3]> {
-    let index = header.elements.iter().position(|element| element.name == b"camera")?;
+    let index = header.elements.iter().position(|element| element.name == CAMERA)?;
     let element = &header.elements[index];
     let [x, y, z] = [b"view_px", b"view_py", b"view_pz"].map(|name| columns::column(element, name));
     let columns = [x?, Column { component: 1, ..y? }, Column { component: 2, ..z? }];
@@ -101,7 +111,7 @@ fn viewpoint(header: &Header, body: &Body) -> Option<[f64; 3]> {
     place.iter().all(|c| c.is_finite()).then_some(place)
 }
 
-/// What is read, and from where.
+/// Rows of text, and bytes in rows that differ in length: what is read of them, and from where.
 struct Reader<'a> {
     vertex: &'a Element<'a>,
     columns: &'a [Column],
@@ -110,19 +120,16 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// Binary rows of one length: columns, block by block.
-    fn read_fixed(&self, part: &Part, stride: usize, big_endian: bool, arrays: &Arrays) {
-        let rows = part.rows(stride);
-        let mut first = 0;
-        while first < part.count {
-            let end = part.count.min(first + BLOCK);
-            for columns in self.columns.chunk_by(Column::is_before) {
-                let rows = Rows { bytes: &rows[first * stride..end * stride], stride };
+    fn read(&self, stage: &Stage) -> Result<Arrays, Error> {
+        let origin = if columns::is_wide(self.columns) { self.origin() } else { DVec3::ZERO };
+        let arrays = Arrays::new(self.columns, self.count, origin)?;
+        tasks::run(stage, self.parts.len(), &|i| {
+            self.walk(&self.parts[i], 1, &mut |point, column, value| {
                 // SAFETY: parts share no point.
-                unsafe { arrays.store_columns(part.first + first, rows, columns, big_endian) };
-            }
-            first = end;
-        }
+                unsafe { arrays.store(point, column, value) };
+            })
+        })?;
+        Ok(arrays)
     }
 
     /// Calls back with each value that is read, in one of `step` rows of the element: those that a file of fixed rows is asked for.
@@ -151,21 +158,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn origin_of_fixed(&self, stride: usize, big_endian: bool) -> DVec3 {
-        choose_origin(self.count, &|point| {
-            let mut position = DVec3::NAN;
-            // All parts but the last are of one size.
-            let part = &self.parts[point / self.parts[0].count];
-            let row = &part.rows(stride)[(point - part.first) * stride..];
-            for column in self.columns.iter().filter(|column| column.target == Target::Positions) {
-                let value = &row[column.offset..column.offset + column.scalar.size()];
-                position[column.component] = column.scalar.to_f64(bits(value, big_endian));
-            }
-            position
-        })
-    }
-
-    fn origin_of_any(&self) -> DVec3 {
+    fn origin(&self) -> DVec3 {
         let step = self.count.div_ceil(SAMPLE).max(1);
         let mut sample = vec![DVec3::NAN; self.count.div_ceil(step)];
         let places = Scatter::new(&mut sample);

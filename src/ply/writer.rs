@@ -34,7 +34,7 @@ pub fn write(file: &[u8], add: &Additions, ascii: bool, progress: &Progress) -> 
     let vertex = &header.elements[index];
     columns::find(vertex)?.ok_or_else(|| header.without_position(vertex))?;
     add.check(vertex.count)?;
-    let body = Body::locate(&header, file)?;
+    let body = Body::locate(&header, file, file.len() as u64)?;
     let steps = plan(vertex, Some(add));
     let mut sink = Sink::new(true);
     write_header(&header, index, &steps, ascii, &mut sink)?;

@@ -1,6 +1,15 @@
 // What the README and the types promise, on the packed package in Node.
 import assert from 'node:assert/strict';
-import { openAsBlob, readFileSync, writeFileSync } from 'node:fs';
+import {
+  closeSync,
+  ftruncateSync,
+  openAsBlob,
+  openSync,
+  readFileSync,
+  rmSync,
+  writeFileSync,
+  writeSync,
+} from 'node:fs';
 import { createServer } from 'node:http';
 import { availableParallelism } from 'node:os';
 import { join } from 'node:path';
@@ -759,6 +768,79 @@ test('maxPoints refuses a larger file', async () => {
     readPointCloud(new Blob([typed]), { maxPoints: 3 }),
     failing('input', /declares 4 points; at most 3 were asked for/),
   );
+});
+
+/** The header of a file of long rows, at whose ends the coordinates are, and the bytes of each. */
+function padded(count, type) {
+  const other = 'property double other\n'.repeat(1024);
+  const places = ['x', 'y', 'z'].map((name) => `property ${type} ${name}\n`).join('');
+  const header = `ply\nformat binary_little_endian 1.0\nelement vertex ${count}\n${other}${places}end_header\n`;
+  return { header: Buffer.from(header), stride: 8192 + 3 * (type === 'double' ? 8 : 4) };
+}
+
+test('a large file gives what it gives in memory, and its errors', async (context) => {
+  const count = 40_000;
+  const { header, stride } = padded(count, 'double');
+  const bytes = Buffer.alloc(header.length + count * stride);
+  header.copy(bytes);
+  for (let i = 0; i < count; i++) {
+    const at = header.length + i * stride + 8192;
+    [431_000 + (i % 7), 5_412_000 + i / 64, i].forEach((value, c) => bytes.writeDoubleLE(value, at + 8 * c));
+  }
+  assert.ok(bytes.length > 3e8);
+  const whole = await readPointCloud(bytes);
+  for (const threads of [1, 2]) {
+    const estimator = await estimatorFor(context, { threads });
+    const told = [];
+    const cloud = await estimator.readPointCloud(new Blob([bytes]), { onProgress: (p) => told.push(p.fraction) });
+    assert.deepEqual(cloud, whole);
+    assert.deepEqual(
+      cloud.origin.map((place) => place > 0),
+      [true, true, true],
+    );
+    assert.ok(new Set(told).size > 20 && told.every((fraction, i) => i === 0 || fraction >= told[i - 1]));
+    await assert.rejects(
+      estimator.readPointCloud(new Blob([bytes]), { maxPoints: 5 }),
+      failing('input', /declares 40000 points; at most 5/),
+    );
+    // What of it is in memory when it is given up is in nobody's way.
+    const control = new AbortController();
+    const onProgress = ({ fraction }) => fraction > 0.3 && control.abort(new Error('enough'));
+    await assert.rejects(estimator.readPointCloud(new Blob([bytes]), { onProgress, signal: control.signal }), /enough/);
+    const cut = new Blob([bytes.subarray(0, -1)]);
+    await assert.rejects(estimator.readPointCloud(cut), failing('format', /ends after 39999 of 40000 rows/));
+    assert.equal((await estimator.readPointCloud(new Blob([bytes]))).count, count);
+  }
+});
+
+test('a file larger than what memory holds is read from the disk', async () => {
+  const count = 560_000;
+  const { header, stride } = padded(count, 'float');
+  const path = join(home, 'large.ply');
+  const file = openSync(path, 'w');
+  try {
+    writeSync(file, header);
+    // All else is zero, and takes no room on the disk.
+    const end = header.length + count * stride;
+    ftruncateSync(file, end);
+    assert.ok(end > 2 ** 32);
+    writeSync(file, Buffer.from(Float32Array.of(1, 2, 3).buffer), 0, 12, end - 12);
+    const { positions } = await readPointCloud(pathToFileURL(path));
+    assert.equal(positions.length, 3 * count);
+    assert.deepEqual(positions.slice(-3), Float32Array.of(1, 2, 3));
+    assert.ok(positions.subarray(0, -3).every((value) => value === 0));
+
+    // It ends while it is read.
+    const onProgress = ({ fraction }) => fraction > 0.1 && ftruncateSync(file, end / 2);
+    await assert.rejects(
+      readPointCloud(pathToFileURL(path), { onProgress }),
+      failing('input', /could not be read: it is shorter than a moment ago/),
+    );
+    assert.equal((await readPointCloud(new Blob([typed]))).count, 4);
+  } finally {
+    closeSync(file);
+    rmSync(path);
+  }
 });
 
 test('writePly keeps every property of a file, in both formats', async () => {
