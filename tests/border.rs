@@ -314,9 +314,37 @@ fn origin_of(cloud: &JsValue) -> Vec<f64> {
     Array::from(&get(cloud, "origin")).iter().map(|number| number.as_f64().unwrap()).collect()
 }
 
+/// Reads a file that is there as a whole.
+fn read(file: Buffer) -> Result<Object, JsValue> {
+    read_ply(file, f64::INFINITY, 0.0, &nobody()).map(Option::unwrap)
+}
+
+#[wasm_bindgen_test]
+fn a_file_that_comes_in_pieces_says_what_it_wants() {
+    let file = write_ply(filled(TRIANGLE.as_bytes()), None, None, false, &nobody()).unwrap();
+    let bytes = view(&file).to_vec();
+    let whole = read(file).unwrap();
+    let length = bytes.len() as f64;
+    let piece = |piece: &[u8]| read_ply(filled(piece), 3.0, length, &nobody());
+    let wanted = piece(&bytes[..bytes.len() - 1]).unwrap().unwrap();
+    let [from, to, step] = ["from", "to", "step"].map(|name| number(&wanted, name) as usize);
+    assert_eq!(to, bytes.len());
+    assert!(step >= to - from);
+    let stride = (to - from) / 3;
+    assert!(piece(&bytes[from..from + stride]).unwrap().is_none());
+    let cloud = piece(&bytes[from + stride..]).unwrap().unwrap();
+    for name in ["positions", "intensity"] {
+        assert_eq!(numbers(&buffer(&cloud, name)), numbers(&buffer(&whole, name)));
+    }
+    // After an error, as after the last piece, the next is the beginning of another file.
+    assert_eq!(thrown(piece(b"solid stl")).0, "format");
+    assert_eq!(thrown(read_ply(filled(&bytes[..bytes.len() - 1]), 2.0, length, &nobody())).0, "input");
+    assert!(piece(&bytes).unwrap().is_some());
+}
+
 #[wasm_bindgen_test]
 fn a_ply_file_is_read_into_its_arrays() {
-    let cloud = read_ply(filled(TRIANGLE.as_bytes()), None, &nobody()).unwrap();
+    let cloud = read(filled(TRIANGLE.as_bytes())).unwrap();
     assert_eq!(number(&cloud, "count"), 3.0);
     assert_eq!(origin_of(&cloud), [0.0; 3]);
     let source = get(&cloud, "source");
@@ -334,7 +362,7 @@ fn normals_put_into_a_file_are_read_from_it() {
     let normals = [0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0];
     for ascii in [true, false] {
         let file = write_ply(filled(TRIANGLE.as_bytes()), Some(floats(&normals)), None, ascii, &nobody()).unwrap();
-        let cloud = read_ply(file, None, &nobody()).unwrap();
+        let cloud = read(file).unwrap();
         assert_eq!(numbers(&buffer(&cloud, "normals")), normals);
         assert_eq!(numbers(&buffer(&cloud, "intensity")), [0.5, 0.25, 1.0]);
     }
@@ -356,7 +384,7 @@ fn a_cloud_alone_becomes_a_file() {
         false,
         &nobody(),
     );
-    let cloud = read_ply(file.unwrap(), None, &nobody()).unwrap();
+    let cloud = read(file.unwrap()).unwrap();
     assert_eq!(texts(&get(&cloud, "source"), "comments"), ["from memory"]);
     let (read_origin, read) = (origin_of(&cloud), numbers(&buffer(&cloud, "positions")));
     for (i, (read, written)) in read.iter().zip(positions).enumerate() {
@@ -369,10 +397,10 @@ fn a_cloud_alone_becomes_a_file() {
 
 #[wasm_bindgen_test]
 fn a_broken_file_says_where() {
-    let error = read_ply(filled(&TRIANGLE.as_bytes()[..TRIANGLE.len() - 8]), None, &nobody()).unwrap_err();
+    let error = read(filled(&TRIANGLE.as_bytes()[..TRIANGLE.len() - 8])).unwrap_err();
     assert_eq!(get(&error, "code"), "format");
     assert!(get(&error, "line").as_f64().is_some() || get(&error, "byte").as_f64().is_some());
-    assert_eq!(thrown(read_ply(filled(b"solid stl"), None, &nobody())).0, "format");
+    assert_eq!(thrown(read(filled(b"solid stl"))).0, "format");
 }
 
 #[wasm_bindgen_test]

@@ -113,6 +113,7 @@ impl<'a> Body<'a> {
     }
 
     /// The byte of the file where an element of a binary one begins.
+    #[cfg(feature = "full")]
     pub fn start(&self, index: usize) -> u64 {
         self.starts[index]
     }

@@ -225,6 +225,8 @@ impl<'a> Cursor<'a> {
         let Some(token) = ahead.token() else {
             return self.miscounted(element);
         };
+        // The library's own search would be in the module for this alone.
+        #[allow(clippy::manual_contains)]
         let hint = if token.iter().any(|byte| *byte == b',') {
             "; wanted a decimal point, and blanks between values"
         } else {

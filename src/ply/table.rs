@@ -87,6 +87,7 @@ impl Table {
     }
 
     /// How much of the reading is behind, from 0 to 1.
+    #[cfg(feature = "full")]
     pub fn share(&self) -> f64 {
         let done = self.done as f64 / self.count as f64;
         match (self.is_first, self.sample.is_empty()) {

@@ -31,6 +31,11 @@ impl Buffer {
     /// the buffer over: they are not zeroed, which would cost as much as to write them.
     #[wasm_bindgen(constructor)]
     pub fn new(byte_length: f64) -> Result<Buffer, JsValue> {
+        if !(byte_length >= 0.0 && byte_length.fract() == 0.0 && byte_length <= u64::MAX as f64) {
+            let message =
+                message!["byteLength is ", number::text(byte_length), "; wanted a whole number of at least 0"];
+            return Err(Error::Input(message).into());
+        }
         let bytes = byte_length as u64;
         // What is too large for an address is too large for memory.
         let words = usize::try_from(bytes.div_ceil(4)).unwrap_or(usize::MAX);
