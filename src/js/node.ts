@@ -11,7 +11,8 @@ export const { estimateNormals, readPointCloud, writePly, createEstimator, featu
     link(new Worker(new URL('./worker-node.js', import.meta.url), { execArgv: [] }), receive, fail),
   size(source) {
     try {
-      return statSync(source as URL).size;
+      // Bytes would be taken for a path.
+      return source instanceof URL ? statSync(source).size : undefined;
     } catch {
       // Told when it is opened.
       return undefined;

@@ -31,9 +31,8 @@ port.on('message', (message) => {
 
 /** A file as far as a Blob is needed; `openAsBlob` would be one, but Node warns that it is experimental. */
 function open(url: string): OpenFile {
-  const path = fileURLToPath(url);
   const using = <T>(work: (file: number) => T): T => {
-    const file = openSync(path, 'r');
+    const file = openSync(fileURLToPath(url), 'r');
     try {
       return work(file);
     } finally {
