@@ -205,7 +205,11 @@ test('of several files the first scan is taken, and folders are refused', async 
 test('a file that is too large for one buffer says so, and one that is no scan says that', async () => {
   page = await browser.openPage(browser.isolated);
   for (const [name, begin, message] of [
-    ['city.ply', 'ply\nformat ascii 1.0\n', 'city.ply: the file has 2.25 GiB, and up to 2 can be opened; '],
+    [
+      'city.ply',
+      'ply\nformat ascii 1.0\n',
+      'city.ply: the file has 2.25 GiB, and text or a mesh can be opened up to 2; ',
+    ],
     ['city.las', 'LASF', 'city.las is a LAS or LAZ file. Only PLY'],
   ]) {
     // One without its bytes: nothing may ask for more than the first of them.

@@ -1,11 +1,9 @@
 // Files that come to the page and leave it: scans from a disk, the sample, what is saved.
-import { readPointCloud, type PointCloud } from 'bilinormal';
+import { BilinormalError, readPointCloud, type PointCloud } from 'bilinormal';
 import { foreign } from './foreign';
 import { measure } from './format';
 import type { Step } from './jobs';
 
-/** No larger file goes into one buffer of wasm. */
-const FILE_MOST = 2 ** 31 - 1;
 const SAMPLE_POINTS = 500_000;
 
 /** Those that begin as PLY files do. */
@@ -17,12 +15,12 @@ export async function onlyScans(files: File[]): Promise<File[]> {
 export async function read(file: File, { signal, begin }: Step): Promise<PointCloud> {
   const onProgress = begin(`Reading ${file.name}`);
   try {
-    // Refused there too, as data without memory for it.
-    if (file.size > FILE_MOST) throw new Error(tooLarge(file));
     return await readPointCloud(file, { signal, onProgress });
   } catch (error) {
+    // Not for its points, but for the file itself.
+    const isTooLarge = error instanceof BilinormalError && error.code === 'limit' && error.needed === file.size;
     // Which says what it is, and what to do with it.
-    throw (await foreign(file)) ?? error;
+    throw (await foreign(file)) ?? (isTooLarge ? new Error(tooLarge(file)) : error);
   }
 }
 
@@ -46,5 +44,5 @@ export function download(blob: Blob, name: string): void {
 }
 
 function tooLarge({ size }: File): string {
-  return `the file has ${measure(size / 2 ** 30)} GiB, and up to 2 can be opened; save it with fewer points, or as binary if it is text`;
+  return `the file has ${measure(size / 2 ** 30)} GiB, and text or a mesh can be opened up to 2; save it as binary, without faces`;
 }
