@@ -425,6 +425,18 @@ fn a_file_larger_than_memory_is_read_or_refused() {
 }
 
 #[test]
+fn rows_that_were_given_up_do_not_count_as_read() {
+    let file = file(LITTLE, 3, &XYZ, &[1; 36]);
+    let rows = file.len() - 36;
+    let mut stream = Stream::new(file.len() as u64, ReadOptions::default());
+    assert!(matches!(stream.take(&file[..rows + 1], &Progress::silent()), Ok(Next::Pieces { .. })));
+    let stop = Progress::new(&|_, _| ControlFlow::Break(()), &|| 0.0);
+    assert_eq!(stream.take(&file[rows..rows + 24], &stop), Err(Error::Cancelled));
+    // Memory that nobody wrote to would come out.
+    assert!(stream.take(&file[rows + 24..], &Progress::silent()).is_err());
+}
+
+#[test]
 fn far_coordinates_of_mixed_types_come_relative_to_one_origin() {
     let coordinates = |i: usize| [431_000.125 + i as f64, 4_580_000.0 + i as f64, 512.5 + i as f64 * 0.25];
     let rows: Vec<Vec<V>> =

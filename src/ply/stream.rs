@@ -64,10 +64,11 @@ impl Stream {
     /// what it is; a file whose header it does not hold is gathered. Every other is as it was asked for.
     ///
     /// # Errors
-    /// Those of [`read`]. Nothing can be taken after an error.
+    /// Those of [`read`]. Nothing can be taken after an error, nor after the cloud.
     #[optimize(size)]
     pub fn take(&mut self, piece: &[u8], progress: &Progress) -> Result<Next, Error> {
-        let all = match &mut self.state {
+        // Put back when all went well: rows that were given up half-way must not count as read.
+        let all = match std::mem::replace(&mut self.state, State::Beginning) {
             State::Beginning if piece.len() as u64 == self.length => read(piece, &self.options, progress)?,
             State::Beginning => {
                 self.state = self.begin(piece)?;
@@ -79,20 +80,20 @@ impl Stream {
                 let there = self.kept.len() as u64;
                 progress.update("load", there as f64 / self.length as f64 / 2.0)?;
                 if there < self.length {
+                    self.state = State::Whole;
                     return Ok(Next::Piece);
                 }
                 read(&self.kept, &self.options, &progress.part(0.5..1.0))?
             }
-            State::Rows(_, table) => {
+            State::Rows(start, mut table) => {
                 let share = table.share();
                 // Of a large file more than there are addresses.
                 let rest = (table.count - table.done).saturating_mul(table.stride);
                 if !table.take(&piece[..piece.len().min(rest)], &progress.stage("read", share..share))? {
-                    return Ok(if table.done > 0 { Next::Piece } else { self.pieces() });
+                    let is_again = table.done == 0;
+                    self.state = State::Rows(start, table);
+                    return Ok(if is_again { self.pieces() } else { Next::Piece });
                 }
-                let State::Rows(_, table) = std::mem::replace(&mut self.state, State::Beginning) else {
-                    return Ok(Next::Piece);
-                };
                 let header = Header::parse(&self.kept)?;
                 let (columns, arrays) = table.complete();
                 // SAFETY: all rows were read.
@@ -111,8 +112,8 @@ impl Stream {
             Err(_) if header::begin(beginning).is_some() => return self.gather(),
             header => header?,
         };
-        let others = |element: &Element| element.count > 0 && (element.stride().is_none() || element.name == CAMERA);
-        if header.elements.iter().any(others) {
+        let needs_all = |element: &Element| element.count > 0 && (element.stride().is_none() || element.name == CAMERA);
+        if header.elements.iter().any(needs_all) {
             return self.gather();
         }
         let (index, columns) = wanted(&header, &self.options)?;
