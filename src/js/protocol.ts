@@ -20,7 +20,7 @@ export interface OpenFile {
   slice(from: number, to: number): { arrayBuffer(): Promise<ArrayBuffer> };
 }
 
-/** Bytes on their way into wasm memory: a Blob to be streamed, bytes to be copied, or the address of a local file. */
+/** Bytes on their way into wasm memory: a Blob to be streamed, bytes to be copied, or the address of a file that Node opens. */
 export type Bytes = Blob | Uint8Array | string;
 
 export interface Start extends EstimatorOptions {
@@ -28,7 +28,7 @@ export interface Start extends EstimatorOptions {
   wasmUrl?: string;
   /** Name of the BroadcastChannel on which a thread tells its death: the worker that owns it cannot, it waits for it. */
   channel: string;
-  /** Whether to load the module with what few callers need: all but reading, and estimating with the default options. */
+  /** Whether to load the module with what few callers need: all but reading what is not large, and estimating by default. */
   full?: boolean;
   /** Why there can be no threads, found out by the calling thread. */
   reason?: string;
@@ -38,8 +38,8 @@ export interface Start extends EstimatorOptions {
 export type Call =
   | { kind: 'hello'; data: [] }
   | { kind: 'estimate'; data: [positions: Uint8Array<ArrayBuffer>, double: boolean, options: { orient?: any }] }
-  /** With `size`, that of the file, it is read in pieces. */
-  | { kind: 'readPly'; data: [file: any, maxPoints: number, size: number] }
+  /** With `size`, that of a file, it is read in pieces. */
+  | { kind: 'readPly'; data: [file: Bytes, maxPoints: number, size: number] }
   | { kind: 'writePly'; data: [file: Bytes, normals: Part, curvature: Part, ascii: boolean] }
   | {
       kind: 'writeCloud';

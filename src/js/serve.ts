@@ -120,7 +120,7 @@ async function answer({ kind, data }: Call, { glue, memory, most, mode }: Loaded
     const [file, ...options] = data;
     // A large file, in the pieces that wasm asks for.
     for (found = { from: 0, to: pieceBytes, step: pieceBytes }; found.step;) {
-      await pour(file, found, (bytes) => (found = glue.readPly(fill(bytes), ...options, tell) ?? found));
+      await pour(file as OpenFile, found, (bytes) => (found = glue.readPly(fill(bytes), ...options, tell) ?? found));
     }
   } else {
     const parts: unknown[] = [];
