@@ -1146,23 +1146,83 @@ test('a large cloud is drawn by many frames, until it is whole', async () => {
       };
     },
   });
-  const points = 2_500_000;
+  // More than one buffer holds.
+  const points = 3_200_000;
+  const buffer = 3_000_000;
   await choose(page, 'large.ply', spherePly(points));
   await result(page, 'large.ply');
+  await page.locator('#canvas[aria-busy=false]').waitFor();
   // A frame later it has begun.
   await page.evaluate(() => {
+    window.draws = [];
     document.querySelector('[data-do=flip]').click();
     return new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve)));
   });
   await page.locator('#canvas[aria-busy=false]').waitFor();
-  const draws = await page.evaluate(() => window.draws);
-  const last = draws.slice(draws.findLastIndex(({ isOfPoints, first }) => isOfPoints && first === 0));
-  const whole = last.pop();
+  const [first, second, ...rest] = await page.evaluate(() => window.draws);
+  // Some of all, at once.
+  assert.ok(first.isOfPoints && first.first === 0 && first.end < points, JSON.stringify(first));
+  assert.ok(second.isShown && !second.isOfPoints, JSON.stringify(second));
+  const whole = rest.pop();
   assert.ok(whole.isShown && !whole.isOfPoints, JSON.stringify(whole));
-  assert.ok(last.length > 1 && last.every(({ isShown }) => !isShown), JSON.stringify(last));
-  for (const [i, { first, end }] of last.entries()) assert.equal(end, last[i + 1]?.first ?? points, `from ${first}`);
+  assert.ok(rest.length > 2 && rest.every(({ isOfPoints, isShown }) => isOfPoints && !isShown), JSON.stringify(rest));
+  let next = 0;
+  for (const { first, end } of rest) {
+    assert.equal(first, next % buffer);
+    next += end - first;
+  }
+  assert.equal(next, points);
   assert.ok((await backsShown(page)) > 0.9);
 });
+
+for (const [what, refuse] of [
+  [
+    'refuses',
+    () => {
+      const { bufferData, getError } = WebGL2RenderingContext.prototype;
+      let isRefused = false;
+      WebGL2RenderingContext.prototype.bufferData = function (target, data, usage) {
+        if (data.byteLength > 2e7) isRefused = true;
+        else bufferData.call(this, target, data, usage);
+      };
+      WebGL2RenderingContext.prototype.getError = function () {
+        if (!isRefused) return getError.call(this);
+        isRefused = false;
+        return this.OUT_OF_MEMORY;
+      };
+    },
+  ],
+  [
+    'stops at',
+    () => {
+      const { bufferData } = WebGL2RenderingContext.prototype;
+      WebGL2RenderingContext.prototype.bufferData = function (target, data, usage) {
+        bufferData.call(this, target, data, usage);
+        if (data.byteLength < 2e7 || this.isContextLost()) return;
+        const extension = this.getExtension('WEBGL_lose_context');
+        extension.loseContext();
+        setTimeout(() => extension.restoreContext(), 100);
+      };
+    },
+  ],
+]) {
+  test(`of a cloud that the graphics card ${what} a part is drawn, evenly spread, and the page says so`, async () => {
+    page = await browser.openPage(browser.isolated, { script: refuse });
+    const points = 2_500_000;
+    await choose(page, 'large.ply', spherePly(points));
+    const facts = await result(page, 'large.ply');
+    assert.match(facts.headline, /2,500,000 points/);
+    await page.locator('#note').getByText('no memory for all points: 625,000 of them are drawn').waitFor();
+    await page.locator('#canvas[aria-busy=false]').waitFor();
+    await page.locator('#lost').waitFor({ state: 'hidden' });
+    await page.getByRole('radio', { name: 'Normals' }).check();
+    const colors = await colorsShown(page, { side: 300 });
+    assert.ok(colors > 100, `${colors} colours`);
+    await page.evaluate(() => document.querySelector('[data-do=flip]').click());
+    await page.getByRole('checkbox', { name: 'Back faces' }).check();
+    assert.ok((await backsShown(page)) > 0.9);
+  });
+}
 
 test('what lies behind an edge is set off, a slope is not', async () => {
   page = await browser.openPage(browser.isolated);

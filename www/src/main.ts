@@ -1,5 +1,5 @@
 // Puts the page together: what a person does goes to the session and the state, what the state says goes to the view.
-import { measure } from './format';
+import { count, measure } from './format';
 import { drawHero } from './hero';
 import { element, showState } from './panel';
 import { createSession, type Session } from './session';
@@ -18,12 +18,17 @@ for (const kind of ['dragover', 'drop']) addEventListener(kind, (event) => event
 let unsupported = await missing();
 let viewer: Viewer | undefined;
 try {
-  if (!unsupported) viewer = createViewer(element('#canvas'));
+  if (!unsupported) viewer = createViewer(element('#canvas'), { onPart: tellPart });
 } catch {
   unsupported = 'This page draws with WebGL 2, which did not start. It may after a restart of the browser.';
 }
 if (viewer) start(viewer);
 store.set({ unsupported, ready: viewer !== undefined });
+
+function tellPart(points: number): void {
+  const text = `The graphics card has no memory for all points: ${count(points)} of them are drawn. Normals are computed and saved for all.`;
+  store.set({ note: { text } });
+}
 
 function start(viewer: Viewer): void {
   const session = createSession(store, viewer);

@@ -21,6 +21,8 @@ export interface Picture {
   setSize(width: number, height: number, ratio: number): void;
   /** Draws the scene into the picture, over what it has, or if it begins `anew` alone. */
   add(scene: Scene, camera: PerspectiveCamera, anew: boolean): void;
+  /** Whether the graphics card has drawn what was added last. */
+  isDrawn(): boolean;
   /** Puts it on the canvas, with eye-dome lighting if it is told how large the discs of the points are. */
   show(camera: PerspectiveCamera, discs?: Discs): void;
 }
@@ -118,6 +120,8 @@ export function createPicture(renderer: WebGLRenderer): Picture {
     },
   });
   const quad = new FullScreenQuad(material);
+  const context = renderer.getContext() as WebGL2RenderingContext;
+  let fence: WebGLSync | null = null;
   return {
     setSize(width, height, ratio) {
       target.setSize(width, height);
@@ -129,7 +133,10 @@ export function createPicture(renderer: WebGLRenderer): Picture {
       renderer.setRenderTarget(target);
       renderer.render(scene, camera);
       renderer.setRenderTarget(null);
+      context.deleteSync(fence);
+      fence = context.fenceSync(context.SYNC_GPU_COMMANDS_COMPLETE, 0);
     },
+    isDrawn: () => !fence || context.getSyncParameter(fence, context.SYNC_STATUS) !== context.UNSIGNALED,
     show(camera, discs) {
       const { near, far, strength, thickness, leastThickness } = material.uniforms;
       near!.value = camera.near;

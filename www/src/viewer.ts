@@ -1,23 +1,13 @@
 // The view: plain arrays in, pixels on one canvas. It knows nothing of files, wasm or the rest of the page, and it draws
 // only when something has changed.
-import {
-  BufferAttribute,
-  BufferGeometry,
-  Group,
-  PerspectiveCamera,
-  Points,
-  Scene,
-  Sphere,
-  Vector3,
-  WebGLRenderer,
-} from 'three';
+import { Group, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from 'three';
 import { OrbitControls } from 'three/examples/jsm/controls/OrbitControls.js';
 import { createPointMaterial, type Shading as MaterialShading } from 'bilinormal/three';
 import type { Bounds } from './bounds';
+import { SPARSE_FROM, SPARSE_MOST, createChunks, type Chunks } from './chunks';
 import { pickPoint } from './pick';
 import { createPicture } from './picture';
 import { spacingOf } from './spacing';
-import { spread } from './spread';
 
 export type Shading = MaterialShading | 'curvature';
 /** An axis of the file, or the opposite of one. */
@@ -64,15 +54,13 @@ export interface Margins {
 /** No scan has this colour, nor has the ramp of the curvature. In style.css, too. */
 const BACK = '#ff3d8b';
 
-/** While the camera moves, clouds above this size may be drawn in part, if whole frames take too long. */
-const SPARSE_FROM = 200_000;
-const SPARSE_MOST = 2_000_000;
+/** While the camera moves, clouds may be drawn in part, if whole frames take too long. */
 const SPARSE_LEAST = 60_000;
 /** A still cloud of more than `SPARSE_MOST` is drawn by many frames, of so many points: slow machines answer between them. */
 const FILL_LEAST = 100_000;
 const FILL_MOST = 8_000_000;
-const FAST_FILL = 50;
-const SLOW_FILL = 150;
+const FAST_FILL = 100;
+const SLOW_FILL = 250;
 /** Frame times between these two, in milliseconds, leave the number of points as it is. */
 const FAST_FRAME = 20;
 const SLOW_FRAME = 36;
@@ -84,9 +72,17 @@ const CLOSING = 2.8;
 const LEAST_PIXELS = 1.5;
 /** Most that a point measures without a choice of its size, where the bulk of the cloud has radius 1: a few are dots. */
 const LARGEST = 0.2;
+/** What the graphics card had no memory for is tried again with this share of the points. */
+const FEWER = 0.25;
 
-/** `edges`: whether what lies behind an edge is darker there. */
-export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): Viewer {
+interface Settings {
+  /** Whether what lies behind an edge is darker there. */
+  edges?: boolean;
+  /** Told how many points are drawn from now on, if the graphics card has no memory for all. */
+  onPart?: (points: number) => void;
+}
+
+export function createViewer(canvas: HTMLCanvasElement, { edges = true, onPart }: Settings = {}): Viewer {
   const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
   const powerPreference = 'high-performance';
   const renderer = new WebGLRenderer({ canvas, alpha: true, antialias: false, depth: false, powerPreference });
@@ -106,11 +102,6 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
   scene.add(turned);
   // Warm and with little light on edges, so that form stands out against both backgrounds.
   const material = createPointMaterial({ color: '#ebe2d3', ambient: 0.02 });
-  const points = new Points(new BufferGeometry(), material);
-  // Bounds come from finite points only; three's own would turn into NaN.
-  points.frustumCulled = false;
-  points.visible = false;
-  turned.add(points);
 
   let cloud: Cloud | undefined;
   let bounds: Bounds | undefined;
@@ -118,10 +109,9 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
   let reach = 1;
   /** What a point of it measures there to close its surface. */
   let closing = 0;
-  let whole = points.geometry;
-  let sparse: BufferGeometry | undefined;
-  /** One of these two is the attribute `color`. */
-  let fileColors: BufferAttribute | undefined;
+  let chunks: Chunks | undefined;
+  /** Whether the graphics card has got something of the cloud that it may have no memory for. */
+  let isUnproven = false;
   let hasCurvature = false;
   let shading: Shading = 'shaded';
   let pointSize = 1;
@@ -152,8 +142,12 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
 
   function draw(now: number): void {
     frame = 0;
+    // When it is back, everything is drawn anew.
+    if (renderer.getContext().isContextLost()) return;
     controls.update();
     const moving = now - lastMove < STILL;
+    // What is asked of the card before it is done with the last would hold up the page, and later frames.
+    if (!moving && filled > 0 && !picture.isDrawn()) return proceed();
     const elapsed = now - lastFrame;
     // Before the first frame of a movement lies a gap, which says nothing.
     if (moving && wasMoving) adapt(elapsed);
@@ -166,7 +160,7 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
   }
 
   function drawPart(most: number): void {
-    setSize(thinOut(most));
+    if (chunks) setSize(chunks.drawSpread(Math.floor(most)));
     picture.add(scene, camera, true);
     show();
   }
@@ -182,7 +176,7 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
 
   /** Draws the next points of a still cloud. Until it is whole, what is drawn in motion stays on the canvas. */
   function fill(elapsed: number): void {
-    const all = cloud ? cloud.positions.length / 3 : 0;
+    const all = chunks?.count ?? 0;
     const isLarge = all > SPARSE_MOST;
     if (filled > 0 && elapsed > SLOW_FILL) filling = Math.max(FILL_LEAST, filling / 2);
     else if (filled > 0 && elapsed < FAST_FILL) filling = Math.min(FILL_MOST, filling * 2);
@@ -192,36 +186,42 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
       lastMove = -Infinity;
       drawPart(Math.min(affordable, filling));
     }
-    points.geometry = whole;
-    setSize(1);
-    const some = isLarge ? filling : all;
-    whole.setDrawRange(filled, some);
-    picture.add(scene, camera, filled === 0);
-    filled += some;
-    if (filled < all) return proceed();
+    if (filled < all || filled === 0) {
+      const end = isLarge ? Math.min(all, Math.floor(filled + filling)) : all;
+      setSize(all);
+      chunks?.drawRange(filled, end);
+      picture.add(scene, camera, filled === 0);
+      filled = end;
+      if (isLarge) return proceed();
+    }
+    if (isLarge && isUnproven && isOutOfMemory()) return drawFewer();
+    isUnproven = false;
     show();
     canvas.ariaBusy = 'false';
   }
 
+  function isOutOfMemory(): boolean {
+    const context = renderer.getContext();
+    let found = false;
+    for (let error = context.getError(); error !== context.NO_ERROR; error = context.getError()) {
+      found ||= error === context.OUT_OF_MEMORY;
+    }
+    return found;
+  }
+
+  function drawFewer(): void {
+    if (!chunks) return;
+    chunks.limit(Math.floor(FEWER * chunks.count));
+    onPart?.(chunks.count);
+    request();
+  }
+
   /** Learns from the time since the last frame how many points this machine draws smoothly. */
   function adapt(elapsed: number): void {
-    if (!sparse) return;
+    if (!chunks || chunks.count <= SPARSE_FROM) return;
     const share = Math.min(0.75, Math.max(0.1, SLOW_FRAME / elapsed));
     if (elapsed > SLOW_FRAME) affordable = Math.max(SPARSE_LEAST, affordable * share);
     else if (elapsed < FAST_FRAME) affordable = Math.min(SPARSE_MOST, affordable * 1.08);
-  }
-
-  /** Chooses the geometry for so many points at the most; returns the share of all that it draws. */
-  function thinOut(most: number): number {
-    const all = cloud ? cloud.positions.length / 3 : 0;
-    if (!sparse || most >= all) {
-      points.geometry = whole;
-      return 1;
-    }
-    const some = Math.min(Math.floor(most), sparse.index!.count);
-    sparse.setDrawRange(0, some);
-    points.geometry = sparse;
-    return some / all;
   }
 
   function setDepthRange(): void {
@@ -232,38 +232,21 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
     camera.updateProjectionMatrix();
   }
 
-  /** Size of a point in world units, and larger where a part of the cloud has to stand for the whole. */
+  /** Size of a point in world units, and larger where a part of the cloud, so many points, has to stand for the whole. */
   function setSize(drawn: number): void {
     if (!cloud) return;
-    material.size = pointSize * closing * Math.min(2, Math.sqrt(1 / drawn));
-  }
-
-  /** New values of an attribute, in the buffer that it has on the graphics card. */
-  function setValues(name: string, values: Float32Array | Uint8Array, size: number): void {
-    const before = whole.getAttribute(name);
-    if (before instanceof BufferAttribute) {
-      before.array = values;
-      before.needsUpdate = true;
-    } else {
-      const attribute = new BufferAttribute(values, size, values instanceof Uint8Array);
-      whole.setAttribute(name, attribute);
-      sparse?.setAttribute(name, attribute);
-    }
+    material.size = pointSize * closing * Math.min(2, Math.sqrt(cloud.positions.length / 3 / drawn));
   }
 
   /** Whether it is the curvature that is shown. */
   const isBent = () => shading === 'curvature' && hasCurvature;
 
   function chooseShading(): void {
-    const lit = whole.hasAttribute('normal');
     const bent = isBent();
-    const colors = bent ? whole.getAttribute('curvature') : fileColors;
-    for (const geometry of [whole, sparse]) {
-      if (colors) geometry?.setAttribute('color', colors);
-      else geometry?.deleteAttribute('color');
-    }
+    const colors = bent ? 'curvature' : cloud?.colors && 'fileColor';
+    chunks?.colorBy(colors);
     const possible = shading === 'curvature' ? (bent ? 'colors' : 'shaded') : shading;
-    const wanted = lit || possible === 'plain' ? possible : 'colors';
+    const wanted = chunks?.has('normal') || possible === 'plain' ? possible : 'colors';
     material.shading = wanted === 'colors' && !colors ? 'plain' : wanted;
   }
 
@@ -370,7 +353,7 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
   }
 
   function pick(at?: { x: number; y: number }): number {
-    if (!cloud) return -1;
+    if (!cloud || !chunks) return -1;
     const box = canvas.getBoundingClientRect();
     const behind = controls.target.clone();
     if (at) {
@@ -379,15 +362,15 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
       behind.set(x, y, 0.5).unproject(camera);
     }
     const eye = new Vector3(...viewer.eye());
-    const along = points.worldToLocal(behind).sub(eye).normalize();
+    const along = chunks.group.worldToLocal(behind).sub(eye).normalize();
     const radius = material.size / 2 / turned.scale.x;
     return pickPoint(cloud.positions, eye.toArray(), along.toArray(), 6 * pixel(), radius);
   }
 
   function focus(event: MouseEvent): void {
     const index = pick({ x: event.clientX, y: event.clientY });
-    if (!cloud || index < 0) return;
-    controls.target.copy(points.localToWorld(new Vector3().fromArray(cloud.positions, index * 3)));
+    if (!cloud || !chunks || index < 0) return;
+    controls.target.copy(chunks.group.localToWorld(new Vector3().fromArray(cloud.positions, index * 3)));
     request();
   }
 
@@ -404,48 +387,43 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
     if (event.key === '+' || event.key === '=') controls.dollyIn(1 / 1.1);
     if (event.key === '-') controls.dollyOut(1 / 1.1);
   });
+  // A card without memory may take away what it has.
+  canvas.addEventListener('webglcontextlost', () => {
+    if (isUnproven && chunks && chunks.count > SPARSE_MOST) drawFewer();
+  });
   canvas.addEventListener('webglcontextrestored', request);
   new ResizeObserver(resize).observe(canvas);
   followPixelRatio();
 
   const viewer: Viewer = {
     show(next, nextBounds, up) {
-      whole.dispose();
-      sparse?.dispose();
+      if (chunks) turned.remove(chunks.group);
+      chunks?.dispose();
       cloud = next;
       bounds = nextBounds;
-      whole = new BufferGeometry();
-      whole.setAttribute('position', new BufferAttribute(next.positions, 3));
-      fileColors = next.colors && new BufferAttribute(next.colors, 4, true);
+      chunks = createChunks(next.positions, material, bounds);
+      chunks.group.position.set(...bounds.centre).negate();
+      turned.add(chunks.group);
+      if (next.colors) chunks.set('fileColor', next.colors, 4);
+      isUnproven = true;
       hasCurvature = false;
-      whole.boundingSphere = new Sphere(new Vector3(...bounds.centre), bounds.reach);
-      sparse = undefined;
-      const all = next.positions.length / 3;
-      if (all > SPARSE_FROM) {
-        sparse = new BufferGeometry();
-        for (const [name, attribute] of Object.entries(whole.attributes)) sparse.setAttribute(name, attribute);
-        sparse.setIndex(new BufferAttribute(spread(all, Math.min(all, SPARSE_MOST)), 1));
-        sparse.boundingSphere = whole.boundingSphere;
-      }
-      points.geometry = whole;
-      points.visible = true;
       turned.scale.setScalar(1 / bounds.radius);
       reach = bounds.reach / bounds.radius;
       closing = Math.min((CLOSING * spacingOf(next.positions)) / bounds.radius, LARGEST);
-      points.position.set(-bounds.centre[0], -bounds.centre[1], -bounds.centre[2]);
       chooseShading();
       turn(up);
       fit();
     },
     setNormals(normals, curvatureColors) {
       hasCurvature = curvatureColors !== undefined;
-      if (curvatureColors) setValues('curvature', curvatureColors, 4);
-      setValues('normal', normals, 3);
+      if (curvatureColors) chunks?.set('curvature', curvatureColors, 4);
+      chunks?.set('normal', normals, 3);
+      isUnproven = true;
       chooseShading();
       request();
     },
     refreshNormals(normals) {
-      setValues('normal', normals, 3);
+      chunks?.set('normal', normals, 3);
       request();
     },
     setBacks(shown) {
@@ -468,8 +446,9 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true } = {}): 
     fit,
     pick,
     eye() {
-      points.updateWorldMatrix(true, false);
-      return points.worldToLocal(camera.position.clone()).toArray();
+      if (!chunks) return [0, 0, 0];
+      chunks.group.updateWorldMatrix(true, false);
+      return chunks.group.worldToLocal(camera.position.clone()).toArray();
     },
     setMargins(next) {
       // A view that was moved stays beside or above what it was.
