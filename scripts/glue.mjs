@@ -68,6 +68,12 @@ export { init as default };
     /let cached(\w+)Memory0 = null;\nfunction (\w+)\(\) \{[^]*?\n\}\n/g,
     'const $2 = () => new $1(wasm.memory.buffer);\n',
   );
+  // Of the threads build: of the names of the global object the one that all engines with SIMD have is tried first.
+  if (/typeof globalThis/.test(glue)) {
+    edit(/const ret = typeof globalThis [^;]*;\n.*\n/, 'return addToExternrefTable0(globalThis);\n');
+    edit(/const ret = typeof (global|self|window) [^;]*;\n.*\n/g, 'return 0;\n');
+  }
+  edit(/Object\.create\(\w+\.prototype\)/g, 'Object.create(this.prototype)');
   // Properties that only the glue itself uses.
   edit(/__destroy_into_raw/g, 'raw');
   edit(/__wbg_ptr/g, 'at');
@@ -95,6 +101,7 @@ function shortenNames(glue, folder) {
   };
   return glue
     .replace(/(?<=\n {8})(\w+)(?=: (?:function|memory))/g, known)
+    .replace(/: function(?=\()/g, '')
     .replace('"./bilinormal_bg.js": import0', `${known('./bilinormal_bg.js')}: import0`)
     .replace(/(?<=\bwasm\.)\w+/g, known);
 }

@@ -9,14 +9,18 @@ export interface Failure extends ErrorDetails {
   fatal?: boolean;
 }
 
-/** An error of the worker's own; the calling thread makes a BilinormalError of it. */
-export const coded = (code: ErrorCode, message: string, more?: Partial<Failure>) =>
-  Object.assign(new Error(message), { code }, more);
+/**
+ * An error of the worker's own, as those of wasm: the calling thread makes a BilinormalError of it. Not an Error, because those
+ * of WebKit have a line of their own.
+ */
+export const coded = (code: ErrorCode, message: string, more?: Partial<Failure>): Failure => ({
+  code,
+  message,
+  ...more,
+});
 
-/** Packs what was thrown, without what is undefined. */
-export function failure(error: unknown): Failure {
-  const { code, message = String(error) } = error as Partial<Failure>;
-  return /^(format|input|limit|unsupported)$/.test(code!)
-    ? JSON.parse(JSON.stringify(error, ['code', 'message', 'line', 'byte', 'needed', 'available', 'fatal']))
-    : { message };
+/** Packs what was thrown. */
+export function failure(error: any): Failure {
+  const { code, message = String(error) } = error;
+  return /^(format|input|limit|unsupported)$/.test(code) ? error : { message };
 }

@@ -2,9 +2,11 @@
 
 use super::{memory, set};
 use crate::error::{Error, Place};
+use js_sys::Object;
 use wasm_bindgen::prelude::*;
 
-/// A JavaScript `Error` with `code`, and with what else is known: `line` or `byte`, `needed` and `available`.
+/// An object of `message` and `code`, and of what else is known: `line` or `byte`, `needed` and `available`. Not an `Error`:
+/// those of WebKit have a `line` of their own.
 impl From<Error> for JsValue {
     #[optimize(size)]
     fn from(error: Error) -> Self {
@@ -14,7 +16,8 @@ impl From<Error> for JsValue {
             }
             error => error,
         };
-        let thrown = js_sys::Error::new(&error.text());
+        let thrown = Object::new();
+        set(&thrown, "message", error.text().as_str());
         let code = match error {
             Error::Format { place, .. } => {
                 match place {
