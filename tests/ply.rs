@@ -2,7 +2,7 @@
 
 mod reference;
 
-use bilinormal::ply::{self, Additions, Format, Next, PointCloud, ReadOptions, Stream};
+use bilinormal::ply::{self, Additions, Format, Next, PointCloud, ReadOptions, Rewrite, Stream};
 use bilinormal::{Error, Place, Progress};
 use reference::Ply;
 use std::cell::RefCell;
@@ -44,8 +44,21 @@ fn in_pieces(
 }
 
 fn write(file: impl AsRef<[u8]>, normals: &[f32], ascii: bool) -> Result<Vec<u8>, Error> {
-    let add = Additions { normals: Some(normals), curvature: None };
-    ply::write(file.as_ref(), &add, ascii, &Progress::silent())
+    write_both(file, &Additions { normals: Some(normals), curvature: None }, ascii)
+}
+
+/// Writes a file as a whole, and makes sure that in pieces it is the same.
+fn write_both(file: impl AsRef<[u8]>, add: &Additions, ascii: bool) -> Result<Vec<u8>, Error> {
+    let file = file.as_ref();
+    let whole = ply::write(file, add, ascii, &Progress::silent());
+    // In the middle of rows, and of elements.
+    for piece in [512, 512.max(file.len() / 2 + 1), 70_001] {
+        let mut rewrite = Rewrite::new(file.len() as u64, ascii);
+        let pieces = file.chunks(piece).chain(file.is_empty().then_some(file));
+        let pieces = pieces.map(|piece| rewrite.take(piece, add, &Progress::silent()));
+        assert_eq!(pieces.collect::<Result<Vec<_>, _>>().map(|pieces| pieces.concat()), whole, "{piece} bytes each");
+    }
+    whole
 }
 
 /// The place and text of the error that reading must end in.
@@ -789,6 +802,16 @@ fn progress_rises_and_can_stop_the_call() {
         let normals = vec![0.0; 3 * count];
         let add = Additions { normals: Some(&normals), curvature: None };
         ply::write(&file, &add, false, &progress).unwrap();
+        let mut rewrite = Rewrite::new(file.len() as u64, true);
+        let in_pieces = RefCell::new(vec![0.0]);
+        let observer = |_: &'static str, fraction: f64| {
+            in_pieces.borrow_mut().push(fraction);
+            ControlFlow::Continue(())
+        };
+        for piece in file.chunks(512.max(file.len() / 3)) {
+            rewrite.take(piece, &add, &Progress::new(&observer, &|| 0.0)).unwrap();
+        }
+        assert!(in_pieces.borrow().is_sorted() && in_pieces.borrow().last() == Some(&1.0), "{in_pieces:?}");
         for phase in ["read", "write"] {
             let seen: Vec<f64> = seen.borrow().iter().filter(|(name, _)| *name == phase).map(|(_, f)| *f).collect();
             assert!(seen.len() >= 2 && seen.is_sorted(), "{seen:?}");
@@ -842,11 +865,11 @@ fn the_whole_output_is_as_expected() {
                   comment after\nelement face 1\nproperty list uchar int i\nend_header\n";
     let normals = [0.0, -0.0, 1.0, 0.1, 1e-10, f32::NAN];
     let add = Additions { normals: Some(&normals), curvature: Some(&[0.25, f32::INFINITY]) };
-    let written = ply::write(source.as_bytes(), &add, true, &Progress::silent()).unwrap();
+    let written = write_both(source.as_bytes(), &add, true).unwrap();
     let wanted = format!("{header}0 1.50 1e2 0 -0 1 0.25\n3 4 5 0.1 1e-10 nan inf\n3 0  1 0\n");
     assert_eq!(String::from_utf8(written).unwrap(), wanted);
 
-    let written = ply::write(source.as_bytes(), &add, false, &Progress::silent()).unwrap();
+    let written = write_both(source.as_bytes(), &add, false).unwrap();
     let mut wanted = header.replace("ascii", LITTLE).into_bytes();
     for value in [0.0, 1.5, 100.0, 0.0, -0.0, 1.0, 0.25, 3.0, 4.0, 5.0, 0.1, 1e-10, f32::NAN, f32::INFINITY] {
         wanted.extend(value.to_le_bytes());
@@ -865,13 +888,13 @@ fn existing_normals_and_curvature_are_replaced_whatever_their_name_and_type() {
     for source in in_all_formats(&properties, &[row]) {
         for ascii in [false, true] {
             let add = Additions { normals: Some(&[0.5, 0.25, 0.125]), curvature: Some(&[0.0625]) };
-            let after = Ply::parse(&ply::write(&source, &add, ascii, &Progress::silent()).unwrap());
+            let after = Ply::parse(&write_both(&source, &add, ascii).unwrap());
             assert_eq!(vertex_properties(&after), ["nz", "x", "nx", "y", "curvature", "z", "ny"]);
             for (name, wanted) in [("nx", 0.5), ("ny", 0.25), ("nz", 0.125), ("curvature", 0.0625), ("y", 2.0)] {
                 assert_eq!(after.floats(name), [wanted], "{name}");
             }
             let add = Additions { normals: None, curvature: Some(&[0.0625]) };
-            let after = Ply::parse(&ply::write(&source, &add, ascii, &Progress::silent()).unwrap());
+            let after = Ply::parse(&write_both(&source, &add, ascii).unwrap());
             assert_eq!(vertex_properties(&after), vertex_properties(&Ply::parse(&source)));
             Ply::parse(&source).assert_kept(&after, &["curvature"]);
             assert_eq!(after.floats("nx"), [9.0]);
@@ -933,7 +956,7 @@ fn additions_of_the_wrong_length_are_refused() {
         "{error}"
     );
     let add = Additions { normals: None, curvature: Some(&[0.0; 3]) };
-    let error = ply::write(&source, &add, false, &Progress::silent()).unwrap_err();
+    let error = write_both(&source, &add, false).unwrap_err();
     assert!(matches!(&error, Error::Input(text) if text.contains("curvature has 3")), "{error}");
 }
 
@@ -976,6 +999,64 @@ fn many_rows_are_written_in_tasks() {
     let cloud = read(&outputs[0]).unwrap();
     assert!(cloud.normals.as_deref() == Some(&normals[..]));
     assert!(cloud.positions == (0..count).flat_map(position).collect::<Vec<f32>>());
+}
+
+#[test]
+fn elements_round_the_points_come_in_pieces_too() {
+    let rows = |count: usize, row: &dyn Fn(usize) -> Vec<V>| (0..count).map(row).collect::<Vec<_>>();
+    let tags = rows(1000, &|i| vec![V::U8(i as u8), V::U16(3 * i as u16)]);
+    let points = rows(400, &|i| vec![V::F32(i as f32), V::F64(0.1), V::F32(2.0), V::I16(-7)]);
+    let tail = rows(700, &|i| vec![V::F64(i as f64 / 3.0)]);
+    for format in [LITTLE, BIG] {
+        let header = format!(
+            "ply\nformat {format} 1.0\nelement tag 1000\nproperty uchar a\nproperty ushort b\nelement nothing 1000000000\n\
+             element vertex 400\nproperty float x\nproperty double y\nproperty float nz\nproperty short z\n\
+             element lists 0\nproperty list uchar int many\nelement tail 700\nproperty double c\nend_header\n"
+        );
+        let file =
+            [header.as_bytes(), &body(format, &tags), &body(format, &points), &body(format, &tail), b"more"].concat();
+        for ascii in [false, true] {
+            let written = write(&file, &[0.5; 1200], ascii).unwrap();
+            let ply = Ply::parse(&written);
+            assert_eq!(vertex_properties(&ply), ["x", "y", "nz", "z", "nx", "ny"]);
+            assert_eq!(ply.element("tail").properties[0].values[699], (699.0_f64 / 3.0).to_bits());
+        }
+        let error = write(&file, &[0.5; 1203], false).unwrap_err();
+        assert!(error.to_string().contains("1203"), "{error}");
+        assert!(write(&file[..file.len() - 5], &[0.5; 1200], false).is_err());
+    }
+}
+
+#[test]
+fn a_file_larger_than_memory_is_written() {
+    let count = 600_000;
+    let beginning = file(LITTLE, count, &[&XYZ[..], &["double other"; 1024]].concat(), &[0; 12]);
+    let header = beginning.len() - 12;
+    let stride = 12 + 8 * 1024;
+    let bytes_of = |rows: usize, stride: usize| rows as u64 * stride as u64;
+    let length = header as u64 + bytes_of(count, stride);
+    assert!(length > 4 << 30);
+    let normals: Vec<f32> = (0..3 * count).map(|i| i as f32).collect();
+    let add = Additions { normals: Some(&normals), curvature: None };
+    let mut rewrite = Rewrite::new(length, false);
+    let mut written = rewrite.take(&beginning, &add, &Progress::silent()).unwrap().len() as u64;
+    // Nine rows and a part of one.
+    let piece = vec![7; 9 * stride + 4321];
+    let (mut came, mut point) = (beginning.len() as u64, 0);
+    while !rewrite.is_complete() {
+        let bytes = &piece[..piece.len().min((length - came) as usize)];
+        let rows = rewrite.take(bytes, &add, &Progress::silent()).unwrap();
+        for row in rows.chunks_exact(stride + 12) {
+            assert!(row[stride..] == bytemuck::cast_slice::<f32, u8>(&normals[point..point + 3])[..]);
+            point += 3;
+        }
+        came += bytes.len() as u64;
+        written += rows.len() as u64;
+        assert!(rows.len() <= 10 * (stride + 12));
+    }
+    let longer = (header + "property float nx\n".len() * 3) as u64;
+    assert_eq!(written, longer + bytes_of(count, stride + 12));
+    assert_eq!(point, normals.len());
 }
 
 #[test]

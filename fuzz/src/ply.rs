@@ -4,7 +4,7 @@
 mod reference;
 
 use crate::{Random, call, peak_of};
-use bilinormal::ply::{self, Additions, Format, Next, PointCloud, ReadOptions, Stream};
+use bilinormal::ply::{self, Additions, Format, Next, PointCloud, ReadOptions, Rewrite, Stream};
 use bilinormal::{Error, Progress};
 use reference::{Element, Ply};
 
@@ -87,6 +87,16 @@ fn in_pieces(file: &[u8], beginning: usize) -> Result<PointCloud, Error> {
     Ok(cloud)
 }
 
+/// Writes a file again from pieces of it.
+fn write_in_pieces(file: &[u8], piece: usize, add: &Additions, ascii: bool) -> Result<Vec<u8>, Error> {
+    let mut rewrite = Rewrite::new(file.len() as u64, ascii);
+    let pieces = file.chunks(piece).chain(file.is_empty().then_some(file));
+    pieces
+        .map(|piece| rewrite.take(piece, add, &Progress::silent()))
+        .collect::<Result<Vec<_>, _>>()
+        .map(|all| all.concat())
+}
+
 /// Reads what was written.
 fn reread(file: &[u8]) -> PointCloud {
     ply::read(file, &ReadOptions::default(), &Progress::silent()).unwrap()
@@ -113,6 +123,7 @@ pub fn rewrite(file: &[u8]) {
         let write = |progress: &Progress| ply::write(file, &add, ascii, progress);
         let (written, peak) = peak_of(|| call(&write, random.bits(), |a, b| a == b));
         assert_fits(peak, file.len() + 16 * count);
+        assert_eq!(written, write_in_pieces(file, 512 + random.below(file.len() + 1), &add, ascii), "in pieces");
         written
     };
     let [binary, text] = [false, true].map(|ascii| write(file, ascii));

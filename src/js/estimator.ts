@@ -273,7 +273,7 @@ export function openEstimator(
         const curvature = pack('curvature', add.curvature);
         const normals = pack('normals', add.normals);
         if (!(Object(cloud) === cloud && 'positions' in cloud))
-          return [{ kind: 'writePly', data: [await resolve(cloud, host.size, tell, stop), normals, curvature, ascii] }];
+          return [{ kind: 'writePly', data: [await resolve(cloud, host.size, tell, stop), ascii, normals, curvature] }];
         const positions = pack('positions', cloud.positions ?? null)!;
         const count = countOf(cloud.positions);
         want((cloud.count ?? count) === count, 'count', cloud.count, `${count}, that of positions`);

@@ -40,7 +40,7 @@ export type Call =
   | { kind: 'estimate'; data: [positions: Uint8Array<ArrayBuffer>, double: boolean, options: { orient?: any }] }
   /** With `size`, that of a file, it is read in pieces. */
   | { kind: 'readPly'; data: [file: Bytes, maxPoints: number, size: number] }
-  | { kind: 'writePly'; data: [file: Bytes, normals: Part, curvature: Part, ascii: boolean] }
+  | { kind: 'writePly'; data: [file: Bytes, ascii: boolean, normals: Part, curvature: Part] }
   | {
       kind: 'writeCloud';
       data: [

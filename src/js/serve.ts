@@ -62,8 +62,12 @@ function refuse([{ buffer }, double, options]: Extract<Call, { kind: 'estimate' 
   );
 }
 
-/** Hands the bytes of a file over in pieces, one after the other, while the next ones load. */
-async function pour(file: OpenFile, { from, to, step }: Pieces, take: (piece: Uint8Array, at: number) => void) {
+/** Hands the bytes of a file over in pieces, one after the other, while the next ones load; of an empty file an empty piece. */
+async function pour(
+  file: OpenFile,
+  take: (piece: Uint8Array, at: number) => void,
+  { from, to, step }: Pieces = { from: 0, to: file.size || 1, step: pieceBytes },
+) {
   const ahead: Promise<any>[] = [];
   for (let next = from; from < to; from += step) {
     for (; next < to && ahead.length < piecesAhead; next += step) {
@@ -96,8 +100,8 @@ async function answer({ kind, data }: Call, { glue, memory, most, mode }: Loaded
     if (!(size >= 0)) return part;
     hear = (phase, fraction) => tell(phase, (1 + fraction) / 2);
     const buffer = new glue.Buffer(size);
-    await pour(part, { from: 0, to: size, step: pieceBytes }, (bytes, at) => {
-      tell('load', at / size / 2);
+    await pour(part, (bytes, at) => {
+      tell('load', at / size / 2 || 0);
       view(buffer).set(bytes, at);
     });
     return buffer;
@@ -107,6 +111,15 @@ async function answer({ kind, data }: Call, { glue, memory, most, mode }: Loaded
     const buffer = new glue.Buffer(bytes.byteLength);
     view(buffer).set(bytes);
     return buffer;
+  }
+
+  const written: BlobPart[] = [];
+  /** Takes what is written out of wasm in pieces, so that it is never twice in memory. */
+  function drain(file: Buffer) {
+    for (let at = 0; at < file.byteLength; at += pieceBytes) {
+      written.push(new Blob([view(file).slice(at, at + pieceBytes)]));
+    }
+    file.free();
   }
 
   let used: Uint8Array | undefined;
@@ -120,8 +133,14 @@ async function answer({ kind, data }: Call, { glue, memory, most, mode }: Loaded
     const [file, ...options] = data;
     // A large file, in the pieces that wasm asks for.
     for (found = { from: 0, to: pieceBytes, step: pieceBytes }; found.step;) {
-      await pour(file as OpenFile, found, (bytes) => (found = glue.readPly(fill(bytes), ...options, tell) ?? found));
+      await pour(file as OpenFile, (bytes) => (found = glue.readPly(fill(bytes), ...options, tell) ?? found), found);
     }
+  } else if (kind === 'writePly') {
+    const [bytes, ascii, ...added] = data;
+    const file = bytes instanceof Uint8Array ? new Blob([bytes as BlobPart]) : (bytes as OpenFile);
+    const buffers = added.map((part) => part && fill(part));
+    // Wasm keeps what is added.
+    await pour(file, (piece) => drain(glue.writePly(fill(piece), ascii, file.size, tell, ...buffers.splice(0))));
   } else {
     const parts: unknown[] = [];
     // Not kept meanwhile: doubles are 24 bytes a point.
@@ -129,15 +148,8 @@ async function answer({ kind, data }: Call, { glue, memory, most, mode }: Loaded
     found = (glue[kind] as any)(...parts, hear);
   }
 
-  if (found instanceof glue.Buffer) {
-    // A file: out of wasm in pieces, so that it is never twice in memory.
-    const pieces: BlobPart[] = [];
-    for (let at = 0; at < found.byteLength; at += pieceBytes) {
-      pieces.push(new Blob([view(found).slice(at, at + pieceBytes)]));
-    }
-    found.free();
-    return new Blob(pieces, { type: 'application/octet-stream' });
-  }
+  if (found instanceof glue.Buffer) drain(found);
+  if (written.length) return new Blob(written, { type: 'application/octet-stream' });
   if (found.report) Object.assign(found.report, mode);
   // Arrays in place of buffers: in new memory, the normals in bytes of the same length that nobody needs any more.
   for (const name in found) {

@@ -49,13 +49,11 @@ export interface Glue {
   estimate(positions: Buffer, double: boolean, options: object, tell: Tell): Estimation;
   /** `file` is a piece of a file of `size` bytes, of which the answer asks for more, or all there is if `size` is 0. */
   readPly(file: Buffer, maxPoints: number, size: number, tell: Tell): Pieces | Cloud | undefined;
-  writePly(
-    file: Buffer,
-    normals: Buffer | undefined,
-    curvature: Buffer | undefined,
-    ascii: boolean,
-    tell: Tell,
-  ): Buffer;
+  /**
+   * `file` is the next piece of a file of `size` bytes, the first with the normals and the curvature that are `added`; the
+   * answer is what follows in the output.
+   */
+  writePly(file: Buffer, ascii: boolean, size: number, tell: Tell, ...added: (Buffer | undefined)[]): Buffer;
   writeCloud(
     positions: Buffer,
     origin: Float64Array,

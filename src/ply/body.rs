@@ -5,11 +5,13 @@
 //! Text is cut into pieces at line ends. A first pass counts the rows and lines of every piece, so that every row knows
 //! its number and every error its line.
 
+use super::Format;
 use super::cursor::Cursor;
 use super::header::{Element, Header};
 use crate::error::{Error, Place};
 use crate::message::message;
 use crate::parallel::{self, Scatter};
+use std::ops::Range;
 
 /// Rows of a part, where rows can be told apart without reading them.
 const TASK: u64 = 1 << 16;
@@ -46,6 +48,21 @@ pub(super) struct Part<'a> {
 }
 
 impl<'a> Part<'a> {
+    /// These rows of a binary element, the first of which is at `start`.
+    #[inline(always)]
+    pub fn of_rows(start: &Cursor<'a>, element: &Element, rows: Range<u64>) -> Vec<Self> {
+        let (task, stride) = element.stride().map_or((element.count, 0), |stride| (TASK, stride));
+        let mut parts = Vec::new();
+        let (mut start, mut first) = (start.clone(), rows.start);
+        while first < rows.end {
+            let count = task.min(rows.end - first) as usize;
+            parts.push(Part { start: start.clone(), skip: 0, first: first as usize, count });
+            start.at += count * stride;
+            first += task;
+        }
+        parts
+    }
+
     /// A cursor before the part's first row.
     pub fn cursor(&self) -> Cursor<'a> {
         let mut cursor = self.start.clone();
@@ -213,18 +230,9 @@ impl<'a> Body<'a> {
                 });
             }
         }
-        if self.header.format == super::Format::Ascii {
+        if self.header.format == Format::Ascii {
             return parts;
         }
-        let (task, stride) = element.stride().map_or((element.count, 0), |stride| (TASK, stride));
-        let mut first = 0;
-        while first < element.count {
-            let count = task.min(element.count - first) as usize;
-            let first_row = first as usize;
-            let start = Cursor::new(self.file, start as usize + first_row * stride, self.header.format);
-            parts.push(Part { start, skip: 0, first: first_row, count });
-            first += task;
-        }
-        parts
+        Part::of_rows(&Cursor::new(self.file, start as usize, self.header.format), element, 0..element.count)
     }
 }

@@ -170,6 +170,18 @@ impl<'a> Header<'a> {
         wrong(lines.number, message!["the file ends within the header; end_header is missing"])
     }
 
+    /// The header, if all of it is in this beginning of a longer file.
+    #[cfg(feature = "full")]
+    pub fn parse_beginning(beginning: &'a [u8]) -> Result<Option<Self>, Error> {
+        match Self::parse(beginning) {
+            // Its last line may end with one more byte.
+            Ok(header) if header.body == beginning.len() => Ok(None),
+            // What is wrong with a header is told by who has all of it.
+            Err(_) if begin(beginning).is_some() => Ok(None),
+            header => header.map(Some),
+        }
+    }
+
     pub fn is_big_endian(&self) -> bool {
         self.format == Format::BinaryBigEndian
     }

@@ -1,12 +1,13 @@
 //! Reading and writing PLY files.
 //!
-//! [`read`] gives a cloud; [`Stream`] gives it from a file that comes in pieces; [`write()`] gives the file it came from,
-//! with normals; [`write_cloud`] makes a file from a cloud alone.
+//! [`read`] gives a cloud; [`write()`] gives the file it came from, with normals; [`Stream`] and [`Rewrite`] do the same with a
+//! file that comes in pieces; [`write_cloud`] makes a file from a cloud alone.
 //!
 //! ```text
 //!                             ┌─ table ─┐
 //!   header ── body ── cursor ─┼─ reader ┴─ columns ── PointCloud
-//! stream ┘                    └─ writer ── sink ───── bytes
+//! stream ┤                    └─ writer ── sink ───── bytes
+//! rewrite┘
 //! ```
 //!
 //! Nothing in a file is trusted: counts are compared with the bytes that are there before memory is taken, and every
@@ -18,6 +19,8 @@ mod columns;
 mod cursor;
 mod header;
 mod reader;
+#[cfg(feature = "full")]
+mod rewrite;
 mod scalar;
 mod sink;
 #[cfg(feature = "full")]
@@ -33,6 +36,8 @@ use std::borrow::Cow;
 
 pub use cloud::write_cloud;
 pub use reader::read;
+#[cfg(feature = "full")]
+pub use rewrite::Rewrite;
 #[cfg(feature = "full")]
 pub use stream::{Next, Stream};
 pub use writer::write;

@@ -2,7 +2,7 @@
 
 use super::body::Body;
 use super::columns;
-use super::header::{self, Element, Header};
+use super::header::{Element, Header};
 use super::reader::{CAMERA, cloud, read, wanted};
 use super::table::Table;
 use super::{PointCloud, ReadOptions};
@@ -105,13 +105,7 @@ impl Stream {
 
     /// Looks how the file is to be read.
     fn begin(&mut self, beginning: &[u8]) -> Result<State, Error> {
-        let header = match Header::parse(beginning) {
-            // Its last line may end with one more byte.
-            Ok(header) if header.body == beginning.len() => return self.gather(),
-            // What is wrong with a header is told by who has all of it.
-            Err(_) if header::begin(beginning).is_some() => return self.gather(),
-            header => header?,
-        };
+        let Some(header) = Header::parse_beginning(beginning)? else { return self.gather() };
         let needs_all = |element: &Element| element.count > 0 && (element.stride().is_none() || element.name == CAMERA);
         if header.elements.iter().any(needs_all) {
             return self.gather();

@@ -30,23 +30,18 @@ use std::sync::{Mutex, PoisonError};
 pub fn write(file: &[u8], add: &Additions, ascii: bool, progress: &Progress) -> Result<Vec<u8>, Error> {
     progress.update("write", 0.0)?;
     let header = Header::parse(file)?;
-    let index = header.vertex()?;
-    let vertex = &header.elements[index];
-    columns::find(vertex)?.ok_or_else(|| header.without_position(vertex))?;
-    add.check(vertex.count)?;
+    let writer = Writer::new(&header, add, ascii)?;
     let body = Body::locate(&header, file, file.len() as u64)?;
-    let steps = plan(vertex, Some(add));
-    let mut sink = Sink::new(true);
-    write_header(&header, index, &steps, ascii, &mut sink)?;
-    sink.text = ascii;
+    let mut sink = writer.begin()?;
     if !ascii {
         // Nothing grows but the vertices, so this is all that is ever needed, but for lists that were text.
         let rows = match header.format {
             Format::Ascii => header.elements.iter().map(Element::bytes).fold(0, usize::saturating_add),
             _ => file.len() - header.body,
         };
-        let grown = steps.iter().filter(|step| step.put < Step::KEEP).count();
-        sink.make_room(rows.saturating_add(grown.saturating_mul(4 * vertex.count as usize)))?;
+        let grown = writer.steps.iter().filter(|step| step.put < Step::KEEP).count();
+        let count = header.elements[writer.vertex].count as usize;
+        sink.make_room(rows.saturating_add(grown.saturating_mul(4 * count)))?;
     }
     // Without properties there is nothing to write, however many rows there are.
     let filled = |element: &Element| if element.properties.is_empty() { 0.0 } else { element.count as f64 };
@@ -56,17 +51,64 @@ pub fn write(file: &[u8], add: &Additions, ascii: bool, progress: &Progress) -> 
         let rows = filled(element);
         let stage = progress.stage("write", done / total.max(1.0)..(done + rows) / total.max(1.0));
         done += rows;
-        let steps = if number == index { &steps } else { &plan(element, None) };
-        let writer = Writer { element, steps, add, kept: number != index };
-        let same = header.format == Format::BinaryLittleEndian && !ascii;
-        match element.stride() {
-            _ if same && number != index => sink.append(body.bytes(number))?,
-            Some(stride) if same => writer.copy(&body.parts(number), stride, &mut sink, &stage)?,
-            _ => writer.translate(&body.parts(number), &mut sink, &stage)?,
+        if writer.keeps(number) {
+            sink.append(body.bytes(number))?;
+        } else {
+            writer.rows(number, &body.parts(number), &mut sink, &stage)?;
         }
     }
     progress.update("write", 1.0)?;
     Ok(sink.bytes)
+}
+
+/// Writes a file with these additions.
+pub(super) struct Writer<'a> {
+    header: &'a Header<'a>,
+    vertex: usize,
+    /// What becomes of the properties of the vertices.
+    steps: Vec<Step>,
+    add: &'a Additions<'a>,
+    ascii: bool,
+}
+
+impl<'a> Writer<'a> {
+    /// Refuses a file without points, and additions of another length.
+    pub fn new(header: &'a Header<'a>, add: &'a Additions<'a>, ascii: bool) -> Result<Self, Error> {
+        let index = header.vertex()?;
+        let vertex = &header.elements[index];
+        columns::find(vertex)?.ok_or_else(|| header.without_position(vertex))?;
+        add.check(vertex.count)?;
+        Ok(Self { header, vertex: index, steps: plan(vertex, Some(add)), add, ascii })
+    }
+
+    /// The header of the output, to which the rows are to be added.
+    pub fn begin(&self) -> Result<Sink, Error> {
+        let mut sink = Sink::new(true);
+        write_header(self.header, self.vertex, &self.steps, self.ascii, &mut sink)?;
+        sink.text = self.ascii;
+        Ok(sink)
+    }
+
+    /// Whether the rows of an element stay as they are, to the byte.
+    pub fn keeps(&self, element: usize) -> bool {
+        element != self.vertex && self.is_same()
+    }
+
+    fn is_same(&self) -> bool {
+        self.header.format == Format::BinaryLittleEndian && !self.ascii
+    }
+
+    /// Writes rows of an element.
+    pub fn rows(&self, number: usize, parts: &[Part], sink: &mut Sink, stage: &Stage) -> Result<(), Error> {
+        let element = &self.header.elements[number];
+        let kept = number != self.vertex;
+        let steps = if kept { &plan(element, None) } else { &self.steps };
+        let rows = Rows { element, steps, add: self.add, kept };
+        match element.stride() {
+            Some(stride) if self.is_same() => rows.copy(parts, stride, sink, stage),
+            _ => rows.translate(parts, sink, stage),
+        }
+    }
 }
 
 /// The properties that may be added.
@@ -160,8 +202,8 @@ fn write_header(header: &Header, vertex: usize, steps: &[Step], ascii: bool, sin
     sink.append(b"end_header\n")
 }
 
-/// Writes the rows of one element.
-struct Writer<'a> {
+/// How the rows of one element are written.
+struct Rows<'a> {
     element: &'a Element<'a>,
     steps: &'a [Step],
     add: &'a Additions<'a>,
@@ -169,7 +211,7 @@ struct Writer<'a> {
     kept: bool,
 }
 
-impl Writer<'_> {
+impl Rows<'_> {
     /// Little-endian rows of one length, to the same: runs of bytes.
     fn copy(&self, parts: &[Part], stride: usize, sink: &mut Sink, stage: &Stage) -> Result<(), Error> {
         // Bytes to copy from a place in the row, or a number to add.
@@ -190,14 +232,18 @@ impl Writer<'_> {
             out_stride += if step.put == Step::DROP { 0 } else { length };
         }
         let count: usize = parts.iter().map(|part| part.count).sum();
+        let first = parts.first().map_or(0, |part| part.first);
         let start = sink.bytes.len();
-        // Fits: room for it was made before.
+        sink.make_room(count * out_stride)?;
         sink.bytes.resize(start + count * out_stride, 0);
         let out = Scatter::new(&mut sink.bytes[start..]);
         tasks::run(stage, parts.len(), &|i| {
             let part = &parts[i];
             // SAFETY: parts share no row.
-            let out = unsafe { out.slice(part.first * out_stride..(part.first + part.count) * out_stride) };
+            let out = unsafe {
+                let begin = part.first - first;
+                out.slice(begin * out_stride..(begin + part.count) * out_stride)
+            };
             let rows = part.rows(stride).chunks_exact(stride).zip(out.chunks_exact_mut(out_stride));
             for ((source, mut target), point) in rows.zip(part.first..) {
                 for (put, from, length) in &moves {

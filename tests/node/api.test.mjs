@@ -872,6 +872,28 @@ test('writePly keeps every property of a file, in both formats', async () => {
   await assert.rejects(wrong, failing('input', /normals.*wanted/));
 });
 
+test('a file of many pieces is written with what is added, as bytes and as a Blob', async () => {
+  const count = 1_500_000;
+  const positions = Float32Array.from({ length: 3 * count }, (_, i) => i / 8);
+  const file = await writePly({ count, positions, origin: [0, 0, 0] }, {});
+  assert.ok(file.size > 2 * 8 * 2 ** 20);
+  const normals = Float32Array.from({ length: 3 * count }, (_, i) => i % 1000);
+  const curvature = Float32Array.from({ length: count }, (_, i) => i % 77);
+  for (const source of [file, await bytesOf(file)]) {
+    const told = [];
+    const blob = await writePly(source, { normals, curvature }, { onProgress: ({ phase }) => told.push(phase) });
+    assert.ok(told.includes('write'));
+    const again = await readPointCloud(blob);
+    assert.deepEqual(again.source.properties, ['x', 'y', 'z', 'nx', 'ny', 'nz', 'curvature']);
+    assert.ok(Buffer.from(again.positions.buffer).equals(Buffer.from(positions.buffer)));
+    assert.ok(Buffer.from(again.normals.buffer).equals(Buffer.from(normals.buffer)));
+    const written = await bytesOf(blob.slice(-4));
+    assert.equal(written.readFloatLE(0), curvature.at(-1));
+  }
+  await assert.rejects(writePly(new Blob(), { normals }), failing('format', /empty/));
+  await assert.rejects(writePly(file, { normals: normals.subarray(3) }), failing('input', /normals/));
+});
+
 test('a cloud written and read again is the same cloud', async () => {
   const cloud = await readPointCloud(new Blob([typed]));
   cloud.origin = [1000, 2000, 3000.5];
