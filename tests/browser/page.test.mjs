@@ -1224,6 +1224,34 @@ for (const [what, refuse] of [
   });
 }
 
+test('where memory does not suffice for signs, normals are as found, and the page says so', async () => {
+  page = await browser.openPage(browser.isolated);
+  // The page's workers get memory for the normals of a million points, but not for their signs.
+  await page.route(/worker-[^/]*\.js$/, async (route) => {
+    const response = await route.fetch();
+    const less = `{
+      const { Memory } = WebAssembly;
+      WebAssembly.Memory = class extends Memory {
+        constructor(limits) { super({ ...limits, maximum: Math.min(limits.maximum, 720) }); }
+      };
+    }\n`;
+    await route.fulfill({ response, body: less + (await response.text()) });
+  });
+  await page.reload();
+  await page.locator('[data-do=choose]:enabled').first().waitFor({ state: 'attached' });
+  await choose(page, 'large.ply', spherePly(1_000_000));
+  const facts = await result(page, 'large.ply');
+  assert.equal(facts.error, undefined);
+  assert.equal(facts.without, 0);
+  await page.locator('#note').getByText('no memory for the signs').waitFor();
+  assert.ok(await page.getByRole('radio', { name: 'As found' }).isChecked());
+  assert.ok(await page.locator('#pending').isHidden());
+  // Nothing else is tried of what does not need more.
+  await page.getByRole('radio', { name: 'Upwards' }).check();
+  await page.getByRole('button', { name: 'Re-run' }).click();
+  await page.waitForFunction(() => document.querySelector('#facts').textContent.includes('upwards'));
+});
+
 test('what lies behind an edge is set off, a slope is not', async () => {
   page = await browser.openPage(browser.isolated);
   // So many that a slope is no step between two of them.

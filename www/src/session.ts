@@ -1,6 +1,6 @@
 // What a person can have done, as one flow: file -> readPointCloud -> estimateNormals, meanwhile viewer.show ->
 // viewer.setNormals -> report. One job runs at a time; a new one cancels it. Curvature is computed while it is shown.
-import { estimateNormals, writePly, type EstimateOptions } from 'bilinormal';
+import { BilinormalError, estimateNormals, writePly, type EstimateOptions } from 'bilinormal';
 import { scannerOf } from '../../src/js/scanner';
 import { boundsOf } from './bounds';
 import { compare } from './compare';
@@ -152,7 +152,18 @@ export function createSession(store: Store, viewer: Viewer): Session {
     const { method, cellKind, cellText, kText, orientKind, up, scan } = store.state;
     const form = { method, cellKind, cellText, kText, orientKind, up };
     const orient = orientOf(orientKind, up, viewer.eye(), scan?.scanner);
-    await compute({ ...parsed.options, orient }, form, UNTURNED, [], step);
+    try {
+      await compute({ ...parsed.options, orient }, form, UNTURNED, [], step);
+    } catch (error) {
+      // Of surfaces they take more memory than all else.
+      if (!isOfMemory(error) || !hasSurfaces(orient)) throw error;
+      const less: Form = { ...form, orientKind: 'none' };
+      store.set(less);
+      await compute({ ...parsed.options, orient: 'none' }, less, UNTURNED, [], step);
+      const { note = { text: 'There is no memory for the signs of so many points: the normals are as found.' } } =
+        store.state;
+      store.set({ note });
+    }
   }
 
   /** A result of its own, in place of one that may be flipped by hand. */
@@ -321,6 +332,8 @@ export function createSession(store: Store, viewer: Viewer): Session {
     cancel: () => jobs.cancel(),
   };
 }
+
+const isOfMemory = (error: unknown) => error instanceof BilinormalError && error.code === 'limit';
 
 /** What to tell of computed normals once they are shown. */
 function compared({ normals, result }: Shown): Pick<State, 'comparison' | 'source'> {
