@@ -29,6 +29,8 @@ export class BilinormalError extends Error implements ErrorDetails {
 
   constructor(code: ErrorCode, message: string, details?: ErrorDetails) {
     super(message);
+    // In Safari that of the script.
+    delete (this as ErrorDetails).line;
     this.code = code;
     Object.assign(this, details);
   }
