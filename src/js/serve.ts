@@ -74,7 +74,7 @@ async function pour(
       // An error is told when its turn comes.
       ahead.push(
         file
-          .slice(next, Math.min(to, next + step))
+          .slice(next, Math.min(to, file.size, next + step))
           .arrayBuffer()
           .catch((error) => error),
       );
@@ -136,11 +136,11 @@ async function answer({ kind, data }: Call, { glue, memory, most, mode }: Loaded
       await pour(file as OpenFile, (bytes) => (found = glue.readPly(fill(bytes), ...options, tell) ?? found), found);
     }
   } else if (kind === 'writePly') {
-    const [bytes, ascii, ...added] = data;
+    // Not kept here: wasm keeps them.
+    const added = data.splice(2).map((part: any) => part && fill(part));
+    const [bytes, ascii] = data;
     const file = bytes instanceof Uint8Array ? new Blob([bytes as BlobPart]) : (bytes as OpenFile);
-    const buffers = added.map((part) => part && fill(part));
-    // Wasm keeps what is added.
-    await pour(file, (piece) => drain(glue.writePly(fill(piece), ascii, file.size, tell, ...buffers.splice(0))));
+    await pour(file, (piece) => drain(glue.writePly(fill(piece), ascii, file.size, tell, ...added.splice(0))));
   } else {
     const parts: unknown[] = [];
     // Not kept meanwhile: doubles are 24 bytes a point.

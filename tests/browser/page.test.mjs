@@ -1252,6 +1252,25 @@ test('where memory does not suffice for signs, normals are as found, and the pag
   await page.waitForFunction(() => document.querySelector('#facts').textContent.includes('upwards'));
 });
 
+test('a browser that has no room for the file that is saved is told of', async () => {
+  page = await browser.openPage(browser.isolated, {
+    script: () => {
+      const { slice } = Blob.prototype;
+      Blob.prototype.slice = function (...range) {
+        const part = slice.apply(this, range);
+        // As Chromium does with what its memory does not hold.
+        if (this.constructor === Blob)
+          part.arrayBuffer = () => Promise.reject(new DOMException('', 'NotReadableError'));
+        return part;
+      };
+    },
+  });
+  await drop(page, 'ball.ply', spherePly(20_000));
+  await result(page, 'ball.ply');
+  await page.getByRole('button', { name: 'Save as PLY' }).click();
+  await page.getByRole('alert').filter({ hasText: 'no room for the file' }).waitFor();
+});
+
 test('what lies behind an edge is set off, a slope is not', async () => {
   page = await browser.openPage(browser.isolated);
   // So many that a slope is no step between two of them.

@@ -890,7 +890,16 @@ test('a file of many pieces is written with what is added, as bytes and as a Blo
     const written = await bytesOf(blob.slice(-4));
     assert.equal(written.readFloatLE(0), curvature.at(-1));
   }
-  await assert.rejects(writePly(new Blob(), { normals }), failing('format', /empty/));
+  const empty = join(project, 'empty.ply');
+  writeFileSync(empty, '');
+  try {
+    for (const source of [new Blob(), new Uint8Array(), pathToFileURL(empty)]) {
+      await assert.rejects(writePly(source, { normals }), failing('format', /the file is empty/));
+      await assert.rejects(readPointCloud(source), failing('format', /the file is empty/));
+    }
+  } finally {
+    rmSync(empty);
+  }
   await assert.rejects(writePly(file, { normals: normals.subarray(3) }), failing('input', /normals/));
 });
 

@@ -34,7 +34,16 @@ export function makeSample(signal: AbortSignal): Promise<File> {
   }).finally(() => worker.terminate());
 }
 
-export function download(blob: Blob, name: string): void {
+export async function download(blob: Blob, name: string): Promise<void> {
+  // A browser that has no room for it tells when it is read. Private windows keep all in memory.
+  await blob
+    .slice(-1)
+    .arrayBuffer()
+    .catch(() => {
+      throw new Error(
+        `the browser has no room for the file, ${measure(blob.size / 1e9)} GB; a private window may have less than another`,
+      );
+    });
   const link = document.createElement('a');
   link.href = URL.createObjectURL(blob);
   link.download = name;

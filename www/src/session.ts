@@ -325,8 +325,8 @@ export function createSession(store: Store, viewer: Viewer): Session {
           { normals, ...(curvature && { curvature }) },
           { signal: step.signal, onProgress: step.begin('Saving') },
         );
+        await download(ply, `${file.name.replace(/(-normals)?\.[^.]*$/, '')}-normals.ply`);
         areSaved = true;
-        download(ply, `${file.name.replace(/(-normals)?\.[^.]*$/, '')}-normals.ply`);
       }),
 
     cancel: () => jobs.cancel(),
