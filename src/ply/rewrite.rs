@@ -31,8 +31,8 @@ struct Place {
     element: usize,
     /// The number of its next row.
     row: u64,
-    /// The first bytes of that.
-    rest: Vec<u8>,
+    /// The first bytes of that, if it is cut in two.
+    begun: Vec<u8>,
 }
 
 impl Rewrite {
@@ -107,32 +107,43 @@ impl Rewrite {
         let writer = Writer::new(&header, add, self.ascii)?;
         let mut sink = if is_first { writer.begin()? } else { Sink::new(self.ascii) };
         let Some(place) = &mut self.place else { return Ok(Vec::new()) };
-        let mut joined = std::mem::take(&mut place.rest);
-        joined.extend_from_slice(bytes);
-        let mut rest = &joined[..];
-        let share = |rest: &[u8]| (self.taken - rest.len() as u64) as f64 / self.length as f64;
+        let mut rest = bytes;
         while let Some(element) = header.elements.get(place.element) {
             // Rows without properties take no bytes, and lists are only where there are no rows.
-            let Some(stride) = element.stride().filter(|&stride| stride > 0) else {
-                place.element += 1;
+            let stride = element.stride().unwrap_or(0);
+            let left = (element.count - place.row).saturating_mul(stride as u64);
+            if left == 0 {
+                (place.element, place.row) = (place.element + 1, 0);
                 continue;
+            }
+            let first;
+            let rows = if place.begun.is_empty() {
+                let whole = rest.len() - rest.len() % stride;
+                rest.split_off(..left.min(whole as u64) as usize).unwrap_or_default()
+            } else {
+                let lacking = rest.len().min(stride - place.begun.len());
+                place.begun.extend_from_slice(rest.split_off(..lacking).unwrap_or_default());
+                if place.begun.len() < stride {
+                    break;
+                }
+                first = std::mem::take(&mut place.begun);
+                &first[..]
             };
-            let end = element.count.min(place.row + (rest.len() / stride) as u64);
-            let (rows, after) = rest.split_at((end - place.row) as usize * stride);
-            let stage = progress.stage("write", share(rest)..share(after));
+            let end = place.row + (rows.len() / stride) as u64;
+            let at = self.taken - rest.len() as u64;
+            let share = |at: u64| at as f64 / self.length as f64;
+            let stage = progress.stage("write", share(at.saturating_sub(rows.len() as u64))..share(at));
             if writer.keeps(place.element) {
                 sink.append(rows)?;
             } else {
                 let parts = Part::of_rows(&Cursor::new(rows, 0, header.format), element, place.row..end);
                 writer.rows(place.element, &parts, &mut sink, &stage)?;
             }
-            rest = after;
-            if end < element.count {
-                place.row = end;
-                place.rest = rest.to_vec();
+            place.row = end;
+            if rest.len() < stride && end < element.count {
+                place.begun.extend_from_slice(rest);
                 break;
             }
-            (place.element, place.row) = (place.element + 1, 0);
         }
         Ok(sink.bytes)
     }
