@@ -1,7 +1,7 @@
 //! The border to JavaScript: typed arrays in, typed arrays out, and the only place that knows `wasm_bindgen`.
 //!
 //! Nothing is decided here. Each function reads its arguments, calls the crate, and hands the result over; whatever
-//! goes wrong is thrown as an `Error` with a `code`. Stopping a call is not the border's business either: the caller
+//! goes wrong is thrown as an object with a `code`. Stopping a call is not the border's business either: the caller
 //! ends the worker that runs it.
 // What all functions throw stands above, once.
 #![allow(clippy::missing_errors_doc)]

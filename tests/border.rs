@@ -1,6 +1,8 @@
 //! The border, called as JavaScript calls it, in headless Node.
 #![cfg(target_arch = "wasm32")]
 
+use bilinormal::Progress;
+use bilinormal::ply::{Additions, Rewrite};
 use bilinormal::wasm::{Buffer, estimate, read_ply, write_cloud, write_ply};
 use js_sys::{Array, Function, JSON, Object, Reflect, Uint8Array, WebAssembly};
 use wasm_bindgen::convert::TryFromJsValue;
@@ -386,6 +388,24 @@ fn normals_put_into_a_file_are_read_from_it() {
 fn write(ascii: bool, normals: Option<Buffer>) -> Result<Buffer, JsValue> {
     let file = filled(TRIANGLE.as_bytes());
     write_ply(file, ascii, TRIANGLE.len() as f64, &nobody(), normals, None)
+}
+
+#[wasm_bindgen_test]
+fn a_file_of_more_bytes_than_there_are_addresses_is_written() {
+    let small = write(false, None).unwrap();
+    let small = view(&small).to_vec();
+    for more in [1, 400, 8 << 20] {
+        let mut file = Rewrite::new((1 << 32) + more, false);
+        // Whatever follows the last row is dropped.
+        assert_eq!(file.take(&small, &Additions::default(), &Progress::silent()).unwrap(), small);
+        let rest = vec![0; 8 << 20];
+        let mut pieces = 0;
+        while !file.is_complete() {
+            assert!(file.take(&rest, &Additions::default(), &Progress::silent()).unwrap().is_empty());
+            pieces += 1;
+        }
+        assert_eq!(pieces, 512 + u64::from(more >= small.len() as u64));
+    }
 }
 
 #[wasm_bindgen_test]

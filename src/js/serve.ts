@@ -74,7 +74,7 @@ async function pour(
       // An error is told when its turn comes.
       ahead.push(
         file
-          .slice(next, Math.min(to, file.size, next + step))
+          .slice(next, Math.min(to, next + step))
           .arrayBuffer()
           .catch((error) => error),
       );
@@ -136,11 +136,12 @@ async function answer({ kind, data }: Call, { glue, memory, most, mode }: Loaded
       await pour(file as OpenFile, (bytes) => (found = glue.readPly(fill(bytes), ...options, tell) ?? found), found);
     }
   } else if (kind === 'writePly') {
-    // Not kept here: wasm keeps them.
-    const added = data.splice(2).map((part: any) => part && fill(part));
-    const [bytes, ascii] = data;
-    const file = bytes instanceof Uint8Array ? new Blob([bytes as BlobPart]) : (bytes as OpenFile);
-    await pour(file, (piece) => drain(glue.writePly(fill(piece), ascii, file.size, tell, ...added.splice(0))));
+    // None of it is kept here: wasm keeps what is added.
+    let file: any = data.shift();
+    if (file instanceof Uint8Array) file = new Blob([file as BlobPart]);
+    const { size } = file;
+    const [ascii, ...added] = data.splice(0).map((part: any) => (part?.buffer ? fill(part) : part));
+    await pour(file, (piece) => drain(glue.writePly(fill(piece), ascii, size, tell, ...added.splice(0))));
   } else {
     const parts: unknown[] = [];
     // Not kept meanwhile: doubles are 24 bytes a point.

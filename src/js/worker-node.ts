@@ -39,10 +39,12 @@ function open(url: string): OpenFile {
       closeSync(file);
     }
   };
+  // That of the beginning: what comes later is of the same file, or an error.
+  let size: number | undefined;
   return {
     get size() {
       try {
-        return using((file) => fstatSync(file).size);
+        return (size ??= using((file) => fstatSync(file).size));
       } catch (error) {
         throw coded('input', `the file could not be read: ${(error as Error).message}`);
       }
@@ -51,6 +53,8 @@ function open(url: string): OpenFile {
       async arrayBuffer() {
         const bytes = new Uint8Array(to - from);
         const read = using((file) => readSync(file, bytes, 0, bytes.length, from));
+        // Of an empty file a byte is asked for, too.
+        if (size === 0) return new ArrayBuffer(0);
         if (read < bytes.length) throw new Error(`it is shorter than a moment ago: no more than ${from + read} bytes`);
         return bytes.buffer;
       },

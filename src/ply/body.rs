@@ -108,6 +108,7 @@ impl<'a> Body<'a> {
             )
         };
         match element.stride() {
+            _ if element.count == 0 => Ok(start),
             Some(0) => Ok(start),
             Some(stride) => {
                 let (rows, stride) = ((self.length - start) / stride as u64, stride as u64);

@@ -54,7 +54,8 @@ impl Rewrite {
     /// Those of [`write()`]. Nothing can be taken after an error.
     pub fn take(&mut self, piece: &[u8], add: &Additions, progress: &Progress) -> Result<Vec<u8>, Error> {
         let is_first = self.taken == 0;
-        let piece = &piece[..piece.len().min((self.length - self.taken) as usize)];
+        let left = usize::try_from(self.length - self.taken).unwrap_or(usize::MAX);
+        let piece = &piece[..piece.len().min(left)];
         self.taken += piece.len() as u64;
         if is_first && self.is_complete() {
             return write(piece, add, self.ascii, progress);
@@ -81,7 +82,10 @@ impl Rewrite {
     /// Where the rows begin, if they can be written as they come.
     fn begin(&self, beginning: &[u8], add: &Additions) -> Result<Option<usize>, Error> {
         let Some(header) = Header::parse_beginning(beginning)? else { return Ok(None) };
-        let needs_all = |(number, element): (usize, &Element)| element.count > 0 && header.stride(number).is_none();
+        // Rows have 32-bit numbers, and those of text and lists are found one after the other.
+        let needs_all = |(number, element): (usize, &Element)| {
+            element.count > 0 && header.stride(number).is_none() || element.count > u32::MAX.into()
+        };
         if header.elements.iter().enumerate().any(needs_all) {
             return Ok(None);
         }

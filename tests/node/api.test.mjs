@@ -903,6 +903,18 @@ test('a file of many pieces is written with what is added, as bytes and as a Blo
   await assert.rejects(writePly(file, { normals: normals.subarray(3) }), failing('input', /normals/));
 });
 
+test('a file that goes away while it is written is an error, and nothing of it is in the next one', async () => {
+  const count = 8_000_000;
+  const path = join(project, 'goes.ply');
+  const positions = new Float32Array(3 * count);
+  writeFileSync(path, await bytesOf(await writePly({ count, positions, origin: [0, 0, 0] }, {})));
+  const onProgress = ({ phase }) => phase === 'write' && rmSync(path, { force: true });
+  const gone = writePly(pathToFileURL(path), { normals: positions }, { onProgress });
+  await assert.rejects(gone, failing('input', /could not be read/));
+  const few = { count: 10, positions: Float32Array.from({ length: 30 }, (_, i) => i), origin: [0, 0, 0] };
+  assert.deepEqual((await readPointCloud(await writePly(await writePly(few, {}), {}))).positions, few.positions);
+});
+
 test('a cloud written and read again is the same cloud', async () => {
   const cloud = await readPointCloud(new Blob([typed]));
   cloud.origin = [1000, 2000, 3000.5];
