@@ -108,7 +108,8 @@ export function createChunks(
   }
 
   function dispose(): void {
-    for (const { points } of parts()) points.geometry.dispose();
+    // With the indices, which are not always drawn by.
+    for (const { points } of parts()) points.geometry.setIndex(index ?? null).dispose();
     group.clear();
     chunks = [];
     sparse = index = undefined;

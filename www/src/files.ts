@@ -34,8 +34,9 @@ export function makeSample(signal: AbortSignal): Promise<File> {
   }).finally(() => worker.terminate());
 }
 
-export async function download(blob: Blob, name: string): Promise<void> {
-  // A browser that has no room for it tells when it is read. Private windows keep all in memory.
+/** Refuses what the browser has no room for. */
+export async function checkRoom(blob: Blob): Promise<void> {
+  // It tells when that is read. Private windows keep all in memory.
   await blob
     .slice(-1)
     .arrayBuffer()
@@ -44,6 +45,9 @@ export async function download(blob: Blob, name: string): Promise<void> {
         `the browser has no room for the file, ${measure(blob.size / 1e9)} GB; a private window may have less than another`,
       );
     });
+}
+
+export function download(blob: Blob, name: string): void {
   const link = document.createElement('a');
   link.href = URL.createObjectURL(blob);
   link.download = name;

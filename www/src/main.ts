@@ -4,7 +4,7 @@ import { drawHero } from './hero';
 import { element, showState } from './panel';
 import { createSession, type Session } from './session';
 import { METHODS, type CellKind, type Method, type OrientKind } from './options';
-import { createStore, type NormalSource, type Store } from './state';
+import { addNote, createStore, type NormalSource, type Store } from './state';
 import { missing } from './support';
 import { createViewer, type Margins, type Shading, type Up, type Viewer } from './viewer';
 
@@ -27,7 +27,7 @@ store.set({ unsupported, ready: viewer !== undefined });
 
 function tellPart(points: number): void {
   const text = `The graphics card has no memory for all points: ${count(points)} of them are drawn. Normals are computed and saved for all.`;
-  store.set({ note: { text } });
+  addNote(store, text);
 }
 
 function start(viewer: Viewer): void {

@@ -135,6 +135,8 @@ export function createPicture(renderer: WebGLRenderer): Picture {
       renderer.setRenderTarget(null);
       context.deleteSync(fence);
       fence = context.fenceSync(context.SYNC_GPU_COMMANDS_COMPLETE, 0);
+      // Or some browsers never come to it.
+      context.flush();
     },
     isDrawn: () => !fence || context.getSyncParameter(fence, context.SYNC_STATUS) !== context.UNSIGNALED,
     show(camera, discs) {

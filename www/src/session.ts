@@ -4,13 +4,13 @@ import { BilinormalError, estimateNormals, writePly, type EstimateOptions } from
 import { scannerOf } from '../../src/js/scanner';
 import { boundsOf } from './bounds';
 import { compare } from './compare';
-import { download, makeSample, onlyScans, read } from './files';
+import { checkRoom, download, makeSample, onlyScans, read } from './files';
 import { foreign } from './foreign';
 import { count } from './format';
 import { createJobs, messageOf, type Step } from './jobs';
 import { METHODS, askedBy, hasSurfaces, orientOf, parseOptions, type OptionsForm } from './options';
 import { colorsOf } from './ramp';
-import { UNTURNED, type NormalSource, type State, type Store, type Turned } from './state';
+import { UNTURNED, addNote, type NormalSource, type State, type Store, type Turned } from './state';
 import { guessUp } from './upright';
 import type { Viewer } from './viewer';
 import { warmingCloud } from './warming';
@@ -157,12 +157,8 @@ export function createSession(store: Store, viewer: Viewer): Session {
     } catch (error) {
       // Of surfaces they take more memory than all else.
       if (!isOfMemory(error) || !hasSurfaces(orient)) throw error;
-      const less: Form = { ...form, orientKind: 'none' };
-      store.set(less);
-      await compute({ ...parsed.options, orient: 'none' }, less, UNTURNED, [], step);
-      const { note = { text: 'There is no memory for the signs of so many points: the normals are as found.' } } =
-        store.state;
-      store.set({ note });
+      await compute({ ...parsed.options, orient: 'none' }, form, UNTURNED, [], step);
+      addNote(store, 'There is no memory for the signs of so many points: the normals are as found.');
     }
   }
 
@@ -269,8 +265,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
       await jobs.run(file.name, async (step) => {
         await show(file, step);
         // Unless there is more to lose.
-        const { note = { text: `The first of ${count(scans.length)} scans is shown.` } } = store.state;
-        if (scans.length > 1) store.set({ note });
+        if (scans.length > 1) addNote(store, `The first of ${count(scans.length)} scans is shown.`);
         await shade(step);
       });
     },
@@ -325,7 +320,9 @@ export function createSession(store: Store, viewer: Viewer): Session {
           { normals, ...(curvature && { curvature }) },
           { signal: step.signal, onProgress: step.begin('Saving') },
         );
-        await download(ply, `${file.name.replace(/(-normals)?\.[^.]*$/, '')}-normals.ply`);
+        await checkRoom(ply);
+        step.signal.throwIfAborted();
+        download(ply, `${file.name.replace(/(-normals)?\.[^.]*$/, '')}-normals.ply`);
         areSaved = true;
       }),
 

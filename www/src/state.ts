@@ -118,3 +118,9 @@ export function createStore(): Store {
     },
   };
 }
+
+/** Tells it beside what else there is to know. */
+export function addNote(store: Store, text: string): void {
+  const { note } = store.state;
+  if (!note?.text.includes(text)) store.set({ note: { ...note, text: note ? `${note.text} ${text}` : text } });
+}

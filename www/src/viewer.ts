@@ -61,6 +61,8 @@ const FILL_LEAST = 100_000;
 const FILL_MOST = 8_000_000;
 const FAST_FILL = 100;
 const SLOW_FILL = 250;
+/** The card is not waited for longer than so, in milliseconds. */
+const LONGEST_FILL = 2000;
 /** Frame times between these two, in milliseconds, leave the number of points as it is. */
 const FAST_FRAME = 20;
 const SLOW_FRAME = 36;
@@ -147,7 +149,8 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true, onPart }
     controls.update();
     const moving = now - lastMove < STILL;
     // What is asked of the card before it is done with the last would hold up the page, and later frames.
-    if (!moving && filled > 0 && !picture.isDrawn()) return proceed();
+    const isWaiting = filled > 0 && !picture.isDrawn() && now - lastFrame < LONGEST_FILL;
+    if (!moving && isWaiting) return proceed();
     const elapsed = now - lastFrame;
     // Before the first frame of a movement lies a gap, which says nothing.
     if (moving && wasMoving) adapt(elapsed);
@@ -194,8 +197,8 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true, onPart }
       filled = end;
       if (isLarge) return proceed();
     }
-    if (isLarge && isUnproven && isOutOfMemory()) return drawFewer();
-    isUnproven = false;
+    if (isUnproven && isOutOfMemory() && all > SPARSE_FROM) return drawFewer();
+    isUnproven &&= renderer.getContext().isContextLost();
     show();
     canvas.ariaBusy = 'false';
   }
@@ -391,7 +394,10 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true, onPart }
   canvas.addEventListener('webglcontextlost', () => {
     if (isUnproven && chunks && chunks.count > SPARSE_MOST) drawFewer();
   });
-  canvas.addEventListener('webglcontextrestored', request);
+  canvas.addEventListener('webglcontextrestored', () => {
+    isUnproven = true;
+    request();
+  });
   new ResizeObserver(resize).observe(canvas);
   followPixelRatio();
 
