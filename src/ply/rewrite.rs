@@ -5,6 +5,7 @@ use super::body::{Body, Part};
 use super::cursor::Cursor;
 use super::header::{Element, Header};
 use super::sink::Sink;
+use super::stream::room;
 use super::writer::{Writer, write};
 use crate::error::Error;
 use crate::progress::Progress;
@@ -63,7 +64,7 @@ impl Rewrite {
         let mut rows = piece;
         if is_first {
             match self.begin(piece, add)? {
-                None => self.gather()?,
+                None => self.kept = room(self.length)?,
                 Some(body) => {
                     self.kept.extend_from_slice(&piece[..body]);
                     self.place = Some(Place::default());
@@ -92,11 +93,6 @@ impl Rewrite {
         Writer::new(&header, add, self.ascii)?;
         Body::locate(&header, beginning, self.length)?;
         Ok(Some(header.body))
-    }
-
-    fn gather(&mut self) -> Result<(), Error> {
-        let room = usize::try_from(self.length).map(|length| self.kept.try_reserve_exact(length));
-        if matches!(room, Ok(Ok(()))) { Ok(()) } else { Err(Error::memory("the file", self.length)) }
     }
 
     /// Writes all rows that are there to their end, after the header if they are the first.

@@ -45,6 +45,13 @@ pub enum Next {
     Cloud(PointCloud),
 }
 
+/// Memory for all of a file, of which there may be more than there are addresses.
+pub(super) fn room(length: u64) -> Result<Vec<u8>, Error> {
+    let mut bytes = Vec::new();
+    let room = usize::try_from(length).map(|length| bytes.try_reserve_exact(length));
+    if matches!(room, Ok(Ok(()))) { Ok(bytes) } else { Err(Error::memory("the file", length)) }
+}
+
 enum State {
     /// Waits for the beginning.
     Beginning,
@@ -126,10 +133,7 @@ impl Stream {
     }
 
     fn gather(&mut self) -> Result<State, Error> {
-        let room = usize::try_from(self.length).map(|length| self.kept.try_reserve_exact(length));
-        if !matches!(room, Ok(Ok(()))) {
-            return Err(Error::memory("the file", self.length));
-        }
+        self.kept = room(self.length)?;
         Ok(State::Whole)
     }
 
