@@ -140,7 +140,7 @@ async function answer({ kind, data }: Call, { glue, memory, most, mode }: Loaded
     let file: any = data.shift();
     if (file instanceof Uint8Array) file = new Blob([file as BlobPart]);
     const { size } = file;
-    const [ascii, ...added] = data.splice(0).map((part: any) => (part?.buffer ? fill(part) : part));
+    const [ascii, ...added]: any[] = await Promise.all(data.splice(0).map(put));
     await pour(file, (piece) => drain(glue.writePly(fill(piece), ascii, size, tell, ...added.splice(0))));
   } else {
     const parts: unknown[] = [];
