@@ -1243,15 +1243,17 @@ test('where memory does not suffice for signs, normals are as found, and the pag
   const facts = await result(page, 'large.ply');
   assert.equal(facts.error, undefined);
   assert.equal(facts.without, 0);
-  await page.locator('#note').getByText('no memory for the signs').waitFor();
+  const lack = page.locator('#facts').getByText('no memory for signs');
+  assert.ok(await lack.isVisible());
   assert.equal(facts.surface, undefined);
   // For the next file, which may be smaller.
   assert.ok(await page.getByRole('radio', { name: 'Consistent' }).isChecked());
   assert.ok(await page.locator('#pending').isHidden());
-  // Nothing else is tried of what does not need more.
+  // There is for what takes less.
   await page.getByRole('radio', { name: 'Upwards' }).check();
   await page.getByRole('button', { name: 'Re-run' }).click();
   await page.waitForFunction(() => document.querySelector('#facts').textContent.includes('upwards'));
+  assert.ok(await lack.isHidden());
 });
 
 test('a browser that has no room for the file that is saved is told of', async () => {

@@ -257,6 +257,10 @@ function signsOf({ components, points }: Report, { scan, used, flipped, turnedSu
       ...(turned ? [fact(count(turned), 'flipped by hand')] : []),
     ];
   }
+  if (used?.lacksSigns) {
+    const about = 'Signs take more memory than there is: any normal may point to the other side of its surface';
+    return [fact('as found', 'no memory for signs', about)];
+  }
   if (typeof used?.orient !== 'object') return [];
   if ('up' in used.orient) {
     const { up } = used.orient;

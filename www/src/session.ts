@@ -158,7 +158,6 @@ export function createSession(store: Store, viewer: Viewer): Session {
       // Of surfaces they take more memory than all else.
       if (!isOfMemory(error) || !hasSurfaces(orient)) throw error;
       await compute({ ...parsed.options, orient: 'none' }, form, UNTURNED, [], step);
-      addNote(store, 'There is no memory for the signs of so many points: the normals are as found.');
     }
   }
 
@@ -194,7 +193,8 @@ export function createSession(store: Store, viewer: Viewer): Session {
     shown = { ...shown, result, options, form };
     viewer.setNormals(result.normals, result.curvature && colorsOf(result.curvature));
     const hasCurvature = result.curvature !== undefined;
-    const used = { method, k, orient, asked: askedBy(form, form.up) };
+    const lacksSigns = orient === 'none' && form.orientKind !== 'none';
+    const used = { method, k, orient, lacksSigns, asked: askedBy(form, form.up) };
     store.set({ scan: { ...scan, hasNormals: true, hasCurvature }, report, used, ...turned, ...compared(shown) });
   }
 
@@ -264,7 +264,6 @@ export function createSession(store: Store, viewer: Viewer): Session {
       }
       await jobs.run(file.name, async (step) => {
         await show(file, step);
-        // Unless there is more to lose.
         if (scans.length > 1) addNote(store, `The first of ${count(scans.length)} scans is shown.`);
         await shade(step);
       });

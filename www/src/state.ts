@@ -54,8 +54,8 @@ export interface State extends OptionsForm, Turned {
   lost: boolean;
   scan: Scan | undefined;
   report: Report | undefined;
-  /** What the report is about, and what the form asked for then. */
-  used: { method: Method; k: number; orient: Orient; asked: string } | undefined;
+  /** What the report is about, and what the form asked for then; `lacksSigns`, if there was no memory for those it asked for. */
+  used: { method: Method; k: number; orient: Orient; lacksSigns: boolean; asked: string } | undefined;
   /** Of the computed normals with those of the file. */
   comparison: Comparison | undefined;
   job: Job | undefined;

@@ -403,7 +403,7 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true, onPart }
 
   const viewer: Viewer = {
     show(next, nextBounds, up) {
-      if (chunks) turned.remove(chunks.group);
+      chunks?.group.removeFromParent();
       chunks?.dispose();
       cloud = next;
       bounds = nextBounds;
