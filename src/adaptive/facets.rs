@@ -75,7 +75,6 @@ const TELLING: usize = 8;
 /// Whether points lie exactly on surfaces in a part of the cloud at least: from how far apart they are across the surface of
 /// their cube, one next to the other, so that both sides of a thin wall in one cube are no noise. Where that surface is none of
 /// these sides a face of one of the points tells, if half of them are in such cubes: where coordinates were rounded a fifth are.
-#[optimize(size)]
 #[inline(never)]
 pub(super) fn are_exact(level: &Level, chosen: &[Chosen]) -> bool {
     /// Bricks to look at.
@@ -189,7 +188,6 @@ impl Facets {
 
     /// The same for a point that is left in doubt, as at the tip of a face or on a narrow one: of all planes through it and two
     /// of those next to it in the 125 cubes.
-    #[optimize(size)]
     #[inline(never)]
     pub fn hidden(&mut self, level: &Level, brick: usize, bit: u32, around: &mut Around, point: Vec3) -> Option<Vec3> {
         let near = around.near(&level.grid, brick, bit, 2);
@@ -340,7 +338,6 @@ fn is_nearly_on(offset: Vec3, normal: Vec3) -> bool {
 
 /// Whether those that lie on a plane are a face, and neither a cut through something else, a narrow strip nor rows: any two rows
 /// of a scanner, or of coordinates that were rounded, lie in a plane.
-#[optimize(size)]
 #[inline(never)]
 fn is_face(offsets: &[Vec3], normal: Vec3, least: f32) -> bool {
     let (mut points, mut nearly) = (0.0, 0.0);

@@ -38,7 +38,6 @@ impl Sheets {
     }
 
     /// Finds the sheets near the cube with bit `bit` of a brick, on whose two sides a surface was fitted, if these are two.
-    #[optimize(size)]
     #[inline(never)]
     pub fn find(&mut self, level: &Level, bit: u32, near: &[Near], between: &Surface) -> bool {
         self.places.clear();
