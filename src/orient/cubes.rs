@@ -79,22 +79,53 @@ fn noise(grid: &Grid, normals: &[Vec3], scale: f32) -> f32 {
     median(&deviations) / scale
 }
 
-/// That of the points of one cube, if they are enough to tell.
+/// That of the points of one cube, if they are enough to tell: of those with about the same normal, where there are most, because
+/// across the faces of an edge all normals together have no direction.
 ///
 /// From how far apart points are along the normal, one next to the other: both sides of a thin wall in one cube are no noise.
 fn deviation(points: &[Placed], normals: &[Vec3], gaps: &mut Vec<f32>) -> Option<f32> {
     /// Fewer points lie on a plane in any case.
     const LEAST: usize = 4;
-    if points.len() < LEAST {
-        return None;
+    /// Normals that differ by up to 45 degrees, as they do in noise: its cosine, squared.
+    const ALIKE: f32 = 0.5;
+    let own = |point: &Placed| normals[point.point as usize];
+    let like = |first: Vec3| points.iter().filter(move |point| first.dot(own(point)).powi(2) >= ALIKE);
+    let (mut first, mut most) = (Vec3::ZERO, 0);
+    for normal in points.iter().map(own) {
+        let count = like(normal).count();
+        // Of as many the one that would win in any order of the points.
+        if count > most || count == most && normal.to_array() > first.to_array() {
+            (first, most) = (normal, count);
+        }
+        if most == points.len() {
+            break;
+        }
     }
-    let mut normal = Vec3::ZERO;
-    for point in points {
-        let own = normals[point.point as usize];
-        normal += aligned(own, normal);
-    }
-    let normal = normal.try_normalize()?;
+    let normal = like(first).map(|point| aligned(own(point), first)).sum::<Vec3>().try_normalize()?;
     gaps.clear();
-    gaps.extend(points.iter().map(|point| point.local.dot(normal)));
-    Some(median::deviation(gaps))
+    gaps.extend(like(first).map(|point| point.local.dot(normal)));
+    (gaps.len() >= LEAST).then(|| median::deviation(gaps))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_faces_of_an_edge_are_no_noise() {
+        let (mut points, mut normals) = (Vec::new(), Vec::new());
+        for i in 0..16 {
+            let [a, b] = [i * 5 % 16, i * 7 % 16].map(|c| c as f32 / 16.0);
+            let (place, normal) = match i % 3 {
+                0 => (Vec3::new(0.0, a, b), Vec3::X),
+                1 => (Vec3::new(a, 0.0, b), Vec3::Y),
+                _ => (Vec3::new(a, b, 0.0), -Vec3::Z),
+            };
+            points.push(Placed { local: place, point: i });
+            normals.push(normal);
+        }
+        assert_eq!(deviation(&points, &normals, &mut Vec::new()), Some(0.0));
+        // Where no four points have about the same normal nothing tells it.
+        assert_eq!(deviation(&points[..6], &normals, &mut Vec::new()), None);
+    }
 }
