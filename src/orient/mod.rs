@@ -10,6 +10,7 @@
 
 mod air;
 mod ball;
+mod between;
 mod components;
 mod cubes;
 mod ends;
