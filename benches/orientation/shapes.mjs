@@ -106,6 +106,24 @@ const star = () => {
   );
 };
 
+/** A comb of rectangles 1 wide and high, in steps from left to right: a spine so high, and so many teeth so wide. */
+const combed = (spine, teeth, width) => {
+  const left = (i) => (i * (1 - width)) / (teeth - 1) - 0.5;
+  const tooth = (i) => [
+    [left(i) + width, spine - 0.5],
+    [left(i) + width, 0.5],
+    [left(i), 0.5],
+    [left(i), spine - 0.5],
+  ];
+  return [[-0.5, -0.5], [0.5, -0.5], ...Array.from({ length: teeth }, (_, i) => tooth(teeth - 1 - i)).flat()];
+};
+
+/** A heat sink: nine fins, at 100,000 points two and a half spacings thick and six apart. */
+const fins = () => prism(combed(0.1, 9, 0.035), 1);
+
+/** A comb: 25 teeth, four spacings wide and as many apart. */
+const comb = () => prism(combed(0.25, 25, 0.02), 0.03);
+
 /** A Moebius band of radius 1 and width 0.8; its normals are those of one way round it. */
 const moebius = () => (random, out) => {
   for (;;) {
@@ -144,6 +162,8 @@ export const SHAPES = {
   moebius: { shape: moebius, open: true, sides: false },
   bracket: { shape: bracket, noise: 'noise0.12' },
   star: { shape: star, noise: 'noise0.12' },
+  fins: { shape: fins, noise: 'noise0.12' },
+  comb: { shape: comb, noise: 'noise0.12' },
   scene: { shape: scene(3), kind: 'scene', noise: 'noise0.12' },
   view: { shape: scene(1), kind: 'scene', noise: 'noise0.12' },
   hall: { shape: scene(1, true), kind: 'scene', noise: 'noise0.12' },
