@@ -197,7 +197,8 @@ fn combed(spine: f64, teeth: usize, width: f64) -> Vec<[f64; 2]> {
     [[-0.5, -0.5], [0.5, -0.5]].into_iter().chain((0..teeth).rev().flat_map(tooth)).collect()
 }
 
-/// Fins two and a half spacings thick and teeth of four: at their ends a patch lies to the next one much as it does to its own sides.
+/// Fins two and a half spacings thick and teeth of four: at their ends a patch lies to the sides of the next one much as it does to
+/// its own.
 #[test]
 fn fins_and_teeth_face_outwards() {
     for (name, polygon, height, noise, least) in [

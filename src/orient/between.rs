@@ -1,34 +1,43 @@
-//! Whether another sheet lies between two patches.
+//! Whether a third patch lies between two.
 //!
 //! Round an edge of a thin wall a patch lies to the far side of it much as it does to the near one, which has the opposite sign,
-//! and so it does at the ends of fins and teeth to the next of these. But no surface goes on from one patch to another through a
-//! third.
+//! and so it does at the ends of fins and teeth to the next of these. But the surface between two patches does not go through a
+//! third one.
 
 use super::patches::{MOST, Patch};
 use crate::error::Error;
 use crate::lanes::transposed;
 use crate::lists::grow;
-use crate::surroundings::{NEAR, STEPS};
-use glam::{Vec3, Vec4, Vec4Swizzles};
+use crate::surroundings::STEPS;
+use glam::{Vec3, Vec4};
 
-/// Two patches are on either side of a third one if both are so far off its plane, in edges: less is noise, or how it bends.
+/// Two patches are on either side of a third one if both are so far off its plane, in edges, and so many deviations of the noise:
+/// less may be noise, or how it bends.
 const OFF: f32 = 0.2;
+const DEVIATIONS: f32 = 2.0;
 
-/// It lies between them if the line from one to the other passes its centre no farther away than this, in edges, squared.
+/// What the squares of how far two are off each other's planes add up to, against that limit squared, where a third one may lie
+/// between them. With less they are in line, as on two plates that cross.
+const IN_LINE: f32 = 2.5;
+
+/// It lies between them if the line from one to the other goes through its plane no farther from its centre than this, in edges,
+/// squared: its points fill about a cube.
 const WITHIN: f32 = 0.36;
 
-/// It has so many points, and is so flat: beside an edge a few of another face may be of any.
+/// It has so many points, and is so flat: what has fewer, or some of a face beyond an edge, may have any normal.
 const LEAST: u32 = 4;
 const FLAT: f32 = 0.8;
 
 /// The patches near one that may lie between it and others.
 pub(super) struct Between {
-    all: Vec<Sheet>,
+    /// How far two are off a third one.
+    off: f32,
+    thirds: Vec<Third>,
     fours: Vec<Four>,
 }
 
 /// One of them.
-struct Sheet {
+struct Third {
     /// From the cube of that patch to its own, in edges.
     step: Vec3,
     centre: Vec3,
@@ -48,130 +57,128 @@ struct Four {
 }
 
 impl Between {
-    /// With room for all that are near a patch.
-    pub fn new(what: &str) -> Result<Self, Error> {
-        let (mut all, mut fours) = (Vec::new(), Vec::new());
-        grow(&mut all, STEPS.len() * MOST, what)?;
+    /// With room for all that are near a patch; `noise` is that of the points, in edges.
+    pub fn new(noise: f32, what: &str) -> Result<Self, Error> {
+        let (mut thirds, mut fours) = (Vec::new(), Vec::new());
+        grow(&mut thirds, STEPS.len() * MOST, what)?;
         grow(&mut fours, STEPS.len() * MOST / 4, what)?;
-        Ok(Self { all, fours })
+        Ok(Self { off: OFF.max(DEVIATIONS * noise), thirds, fours })
     }
 
-    /// Looks for them among all patches that are near the cube of one, by number and bit of
-    /// [`Places::near`](crate::surroundings::Places::near).
-    pub fn look(&mut self, patches: &[Patch], near: &[(usize, u32)], own: &Patch) {
-        let Self { all, fours } = self;
-        all.clear();
-        all.extend(near.iter().filter_map(|&(number, place)| {
-            let Patch { centre, normal, points, flatness, .. } = patches[number];
-            let step = NEAR[place as usize % 64].xyz();
+    /// A bit for each of four pairs that something may lie between; `off` are the sums of the squares of how far the two are off
+    /// each other's planes.
+    pub fn may_be_parted(&self, off: Vec4) -> u32 {
+        off.cmpgt(Vec4::splat(IN_LINE * self.off * self.off)).bitmask()
+    }
+
+    /// Looks for those that may lie between a patch and others: of patches near by, each with what lies between the cube of that
+    /// one and its own, and how far that one is off its plane.
+    pub fn look<'a>(&mut self, own: &Patch, others: impl Iterator<Item = (&'a Patch, Vec3, f32)>) {
+        self.thirds.clear();
+        self.thirds.extend(others.filter_map(|(&Patch { centre, normal, points, flatness, .. }, step, height)| {
             let line = (own.centre - centre) - step;
-            let height = line.dot(normal);
-            let is_off = points >= LEAST && flatness >= FLAT && height.abs() > OFF;
-            is_off.then_some(Sheet { step, centre, normal, line, height })
+            let may_part = height.abs() > self.off && points >= LEAST && flatness >= FLAT;
+            may_part.then_some(Third { step, centre, normal, line, height })
         }));
-        fours.clear();
-        fours.extend(all.chunks(4).map(Four::of));
+        self.fours.clear();
+        self.fours.extend(self.thirds.chunks(4).map(Four::of));
     }
 
     /// Whether one of them lies between the patch and another one, `step` cubes away. The same from both ends, to the bit: only
     /// what is near both counts.
-    pub fn parts(&self, other: &Patch, step: Vec3) -> bool {
-        let [step, other] = [step, other.centre].map(|vector| vector.to_array().map(Vec4::splat));
-        self.fours.iter().any(|four| four.parts(other, step))
+    pub fn part(&self, other: &Patch, step: Vec3) -> bool {
+        let [step, place] = [step, other.centre].map(|vector| vector.to_array().map(Vec4::splat));
+        self.fours.iter().any(|four| four.part(place, step, self.off))
     }
 }
 
 impl Four {
-    fn of(sheets: &[Sheet]) -> Self {
-        let rows = |row: &dyn Fn(&Sheet) -> Vec4| {
-            transposed([0, 1, 2, 3].map(|lane| row(&sheets[lane.min(sheets.len() - 1)])))
-        };
-        let vectors = |vector: &dyn Fn(&Sheet) -> Vec3| {
-            let [x, y, z, _] = rows(&|sheet| vector(sheet).extend(0.0));
-            [x, y, z]
-        };
+    fn of(thirds: &[Third]) -> Self {
+        let row =
+            |of: &dyn Fn(&Third) -> Vec4| transposed([0, 1, 2, 3].map(|lane| of(&thirds[lane.min(thirds.len() - 1)])));
+        let [step_x, step_y, step_z, height] = row(&|third| third.step.extend(third.height));
+        let [x, y, z, _] = row(&|third| third.centre.extend(0.0));
+        let [normal_x, normal_y, normal_z, _] = row(&|third| third.normal.extend(0.0));
+        let [line_x, line_y, line_z, _] = row(&|third| third.line.extend(0.0));
         Self {
-            step: vectors(&|sheet| sheet.step),
-            centre: vectors(&|sheet| sheet.centre),
-            normal: vectors(&|sheet| sheet.normal),
-            line: vectors(&|sheet| sheet.line),
-            height: rows(&|sheet| Vec4::splat(sheet.height))[0],
+            step: [step_x, step_y, step_z],
+            centre: [x, y, z],
+            normal: [normal_x, normal_y, normal_z],
+            line: [line_x, line_y, line_z],
+            height,
         }
     }
 
-    /// Whether one of the four lies before a place, `step` cubes away.
+    /// Whether one of the four lies between the patch and a place, `step` cubes away.
     #[inline(always)]
-    fn parts(&self, place: [Vec4; 3], step: [Vec4; 3]) -> bool {
-        let dot =
-            |[x, y, z]: [Vec4; 3], [other_x, other_y, other_z]: [Vec4; 3]| x * other_x + y * other_y + z * other_z;
+    fn part(&self, place: [Vec4; 3], step: [Vec4; 3], off: f32) -> bool {
+        let dot = |a: [Vec4; 3], b: [Vec4; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let away = [0, 1, 2].map(|axis| step[axis] - self.step[axis]);
         let line = [0, 1, 2].map(|axis| (place[axis] - self.centre[axis]) + away[axis]);
         let height = dot(line, self.normal);
         let through = [0, 1, 2].map(|axis| height * self.line[axis] - self.height * line[axis]);
         let rise = height - self.height;
-        let is_near = away.into_iter().map(|away| away.abs().cmple(Vec4::ONE)).reduce(|one, other| one & other);
-        let is_beyond = (height * self.height).cmplt(Vec4::ZERO) & height.abs().cmpgt(Vec4::splat(OFF));
+        let [near_x, near_y, near_z] = away.map(|away| away.abs().cmple(Vec4::ONE));
+        let is_beyond = (height * self.height).cmplt(Vec4::ZERO) & height.abs().cmpgt(Vec4::splat(off));
         let is_within = dot(through, through).cmplt(WITHIN * (rise * rise));
-        is_near.is_some_and(|is_near| (is_near & is_beyond & is_within).any())
+        (near_x & near_y & near_z & is_beyond & is_within).any()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surroundings::Places;
 
     fn patch(centre: Vec3, normal: Vec3) -> Patch {
         Patch { centre, normal, points: 16, flatness: 1.0, has_rival: false, bend: 0.0 }
     }
 
-    /// Whether the third of some patches, each of them at a bit of [`Places::near`], lies between the first two; from both ends.
-    fn are_parted(patches: [Patch; 3], places: [u32; 3]) -> bool {
-        let step = |of: usize| NEAR[places[of] as usize].xyz();
-        let mut between = Between::new("the test").unwrap();
+    /// Whether the third of some patches, each so many cubes away, lies between the first two; from both ends.
+    fn are_parted(patches: [(Patch, Vec3); 3]) -> bool {
+        let mut between = Between::new(0.0, "the test").unwrap();
         let [there, back] = [(0, 1), (1, 0)].map(|(from, to)| {
-            // Against the cube of the one that looks.
-            let place = |of: usize| {
-                let away = step(of) - step(from);
-                NEAR.iter().position(|near| near.xyz() == away && away != Vec3::ZERO).unwrap_or(23) as u32
-            };
-            between.look(&patches, &[0, 1, 2].map(|of| (of, place(of))), &patches[from]);
-            between.parts(&patches[to], step(to) - step(from))
+            let ((own, place), (other, _)) = (patches[from], patches[to]);
+            // Against the cube of the one that looks, and none that is not near it.
+            let all = patches.iter().map(|(patch, step)| (patch, step - place));
+            let near = all.filter(|(_, step)| step.abs().max_element() <= 1.0);
+            let height = |patch: &Patch, step: Vec3| (own.centre - patch.centre - step).dot(patch.normal);
+            between.look(&own, near.map(|(patch, step)| (patch, step, height(patch, step))));
+            between.part(&other, patches[to].1 - place)
         });
         assert_eq!(there, back);
         there
     }
 
-    const HERE: u32 = Places::NEAR_CENTRE;
-
-    /// The end of a wall, its far side, and its near side between them.
+    /// The end of a wall, a cube below, and its two sides, which end there.
     #[test]
     fn the_far_side_of_a_wall_is_parted_from_what_is_round_its_edge() {
-        let end = patch(Vec3::new(0.4, 0.0, 0.0), Vec3::X);
-        let far = patch(Vec3::new(-0.2, 0.0, 0.3), Vec3::Z);
-        let near = patch(Vec3::new(-0.2, 0.0, -0.4), Vec3::Z);
-        // Seen from outside, a cube further down.
-        let below = patch(Vec3::new(0.2, 0.0, 0.1), Vec3::X);
-        assert!(are_parted([below, far, near], [HERE - 16, HERE, HERE]));
-        assert!(!are_parted([end, far, near], [HERE; 3]), "both sides end there");
-        assert!(!are_parted([below, near, far], [HERE - 16, HERE, HERE]));
+        let end = (patch(Vec3::new(0.2, 0.0, 0.1), Vec3::X), -Vec3::Z);
+        let [near, far] = [-0.4, 0.3].map(|z| (patch(Vec3::new(-0.2, 0.0, z), Vec3::Z), Vec3::ZERO));
+        assert!(are_parted([end, far, near]));
+        assert!(!are_parted([end, near, far]));
+        // Where the line between the two goes past it.
+        assert!(!are_parted([end, far, (near.0, -Vec3::X)]));
+        // And where it is not near one of them, which does not know of it.
+        assert!(!are_parted([end, (far.0, Vec3::Z), (near.0, Vec3::Z)]));
     }
 
     #[test]
     fn nothing_lies_between_parts_of_one_surface() {
-        let on_arc = |angle: f32| {
-            let normal = Vec3::new(angle.sin(), 0.0, angle.cos());
-            patch(2.0 * normal - 2.0 * Vec3::Z, normal)
-        };
-        assert!(!are_parted([on_arc(-0.3), on_arc(0.3), on_arc(0.0)], [HERE; 3]));
+        for bend in [-0.5, 0.5] {
+            let on_arc = |angle: f32| {
+                let normal = Vec3::new(angle.sin(), 0.0, angle.cos());
+                (patch((normal - Vec3::Z) / bend, normal), Vec3::ZERO)
+            };
+            assert!(!are_parted([on_arc(-0.3), on_arc(0.3), on_arc(0.0)]));
+        }
     }
 
     #[test]
     fn a_few_points_and_those_of_more_faces_part_nothing() {
-        let [below, above] = [-0.4, 0.4].map(|z| patch(Vec3::new(0.0, 0.0, z), Vec3::X));
-        let middle = patch(Vec3::ZERO, Vec3::Z);
-        assert!(are_parted([below, above, middle], [HERE; 3]));
-        assert!(!are_parted([below, above, Patch { points: LEAST - 1, ..middle }], [HERE; 3]));
-        assert!(!are_parted([below, above, Patch { flatness: 0.7, ..middle }], [HERE; 3]));
+        let [below, above, middle] = [-0.4, 0.4, 0.0].map(|z| patch(Vec3::new(0.1 * z, 0.0, z), Vec3::Z));
+        let are_parted = |middle| are_parted([below, above, middle].map(|patch| (patch, Vec3::ZERO)));
+        assert!(are_parted(middle));
+        assert!(!are_parted(Patch { points: LEAST - 1, ..middle }));
+        assert!(!are_parted(Patch { flatness: 0.7, ..middle }));
     }
 }

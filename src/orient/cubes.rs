@@ -79,8 +79,8 @@ fn noise(grid: &Grid, normals: &[Vec3], scale: f32) -> f32 {
     median(&deviations) / scale
 }
 
-/// That of the points of one cube, if they are enough to tell: of those with about the same normal, where there are most, because
-/// across the faces of an edge all normals together have no direction.
+/// That of the points of one cube, if they are enough to tell: of those with about the same normal, if these are half of them,
+/// because across the faces of an edge all normals together have no direction.
 ///
 /// From how far apart points are along the normal, one next to the other: both sides of a thin wall in one cube are no noise.
 fn deviation(points: &[Placed], normals: &[Vec3], gaps: &mut Vec<f32>) -> Option<f32> {
@@ -88,44 +88,63 @@ fn deviation(points: &[Placed], normals: &[Vec3], gaps: &mut Vec<f32>) -> Option
     const LEAST: usize = 4;
     /// Normals that differ by up to 45 degrees, as they do in noise: its cosine, squared.
     const ALIKE: f32 = 0.5;
+    if points.len() < LEAST {
+        return None;
+    }
     let own = |point: &Placed| normals[point.point as usize];
     let like = |first: Vec3| points.iter().filter(move |point| first.dot(own(point)).powi(2) >= ALIKE);
+    let first = most_alike(points.iter().map(own), &|first| like(first).count());
+    let is_most = like(first).count() >= points.len().div_ceil(2).max(LEAST);
+    let chosen = || points.iter().filter(|point| !is_most || first.dot(own(point)).powi(2) >= ALIKE);
+    let normal = chosen().fold(Vec3::ZERO, |sum, point| sum + aligned(own(point), sum)).try_normalize()?;
+    gaps.clear();
+    gaps.extend(chosen().map(|point| point.local.dot(normal)));
+    Some(median::deviation(gaps))
+}
+
+/// The normal that most others are like, as `count` tells, or zero where there are too many to ask each. Of as many the one that
+/// is so in any order of the points.
+fn most_alike(normals: impl ExactSizeIterator<Item = Vec3>, count: &dyn Fn(Vec3) -> usize) -> Vec3 {
+    /// In cubes of more points another piece of surface is hardly ever small against the cube.
+    const MANY: usize = 64;
+    let all = normals.len();
     let (mut first, mut most) = (Vec3::ZERO, 0);
-    for normal in points.iter().map(own) {
-        let count = like(normal).count();
-        // Of as many the one that would win in any order of the points.
+    for normal in normals.take(if all > MANY { 0 } else { all }) {
+        let count = count(normal);
         if count > most || count == most && normal.to_array() > first.to_array() {
             (first, most) = (normal, count);
         }
-        if most == points.len() {
+        if most == all {
             break;
         }
     }
-    let normal = like(first).map(|point| aligned(own(point), first)).sum::<Vec3>().try_normalize()?;
-    gaps.clear();
-    gaps.extend(like(first).map(|point| point.local.dot(normal)));
-    (gaps.len() >= LEAST).then(|| median::deviation(gaps))
+    first
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn the_faces_of_an_edge_are_no_noise() {
-        let (mut points, mut normals) = (Vec::new(), Vec::new());
-        for i in 0..16 {
+    /// The deviation of points on the faces of a corner, each on the one that `face` says.
+    fn on_faces(face: impl Fn(u32) -> u32) -> f32 {
+        let all = (0..16).map(|i| {
             let [a, b] = [i * 5 % 16, i * 7 % 16].map(|c| c as f32 / 16.0);
-            let (place, normal) = match i % 3 {
+            let (local, normal) = match face(i) {
                 0 => (Vec3::new(0.0, a, b), Vec3::X),
                 1 => (Vec3::new(a, 0.0, b), Vec3::Y),
                 _ => (Vec3::new(a, b, 0.0), -Vec3::Z),
             };
-            points.push(Placed { local: place, point: i });
-            normals.push(normal);
-        }
-        assert_eq!(deviation(&points, &normals, &mut Vec::new()), Some(0.0));
-        // Where no four points have about the same normal nothing tells it.
-        assert_eq!(deviation(&points[..6], &normals, &mut Vec::new()), None);
+            (Placed { local, point: i }, normal)
+        });
+        let (points, normals): (Vec<Placed>, Vec<Vec3>) = all.unzip();
+        deviation(&points, &normals, &mut Vec::new()).unwrap()
+    }
+
+    #[test]
+    fn the_faces_of_an_edge_are_no_noise() {
+        assert_eq!(on_faces(|_| 2), 0.0);
+        assert_eq!(on_faces(|i| u32::from(i % 3 == 0)), 0.0);
+        // Where half of them have not about the same normal it is that of all.
+        assert!(on_faces(|i| i % 3) > 0.1);
     }
 }

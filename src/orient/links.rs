@@ -48,8 +48,9 @@ const SHARPNESS: f32 = 0.2;
 const LEAST_SQUARINGS: usize = 2;
 const MOST_SQUARINGS: usize = 5;
 
-/// How much the least of these powers counts beside the one that noise allows: across some edges there is nothing more. The less
-/// the more alike two normals are: a smooth surface needs none of it, and both sides of a thin wall would have most of theirs.
+/// How much the least of these powers counts beside the one that noise allows: across some edges there is nothing more. The more
+/// alike two normals are, the less it counts: a smooth surface needs none of it, and between the two sides of a thin wall it would
+/// be most of the evidence.
 const BLUNT: f32 = 0.2;
 
 /// With less noise, in edges, patches of one cube are of different sheets: else noise may have parted one into layers.
@@ -60,9 +61,6 @@ const EVEN: f32 = 1e-3;
 
 /// Less is no evidence, and costs memory.
 const LEAST: f32 = 0.01;
-
-/// Nothing lies between patches that are less off each other's planes, in edges, squared.
-const OFF: f32 = 0.1;
 
 /// Links that a list has room for, unless one group has more.
 const LIST: usize = 1 << 14;
@@ -77,7 +75,7 @@ impl Links {
             let mut surroundings = Surroundings::new();
             let (mut near, mut fours, mut links) = (Vec::new(), Vec::new(), Vec::new());
             let (mut told, mut shares) = (Vec::new(), Vec::new());
-            let mut between = Between::new(GRAPH)?;
+            let mut between = Between::new(noise, GRAPH)?;
             grow(&mut near, STEPS.len() * MOST, GRAPH)?;
             grow(&mut fours, STEPS.len() * MOST / 4, GRAPH)?;
             let mut looked_at = None;
@@ -109,19 +107,23 @@ impl Links {
                 grow(&mut links, all.len() * near.len(), GRAPH)?;
                 for (i, own) in all.enumerate() {
                     let start = links.len();
-                    between.look(&patches.all, &near, &patches.all[own]);
                     let row = i * fours.len()..(i + 1) * fours.len();
+                    let heights = told[row.clone()].iter().flat_map(|told| told.height.to_array());
+                    let others = near.iter().zip(heights);
+                    between.look(
+                        &patches.all[own],
+                        others.map(|(&(other, place), height)| (&patches.all[other], step(place), height)),
+                    );
                     for ((near, told), share) in near.chunks(4).zip(&told[row.clone()]).zip(&shares[row]) {
                         let says = told.evidence.abs().cmpgt(Vec4::splat(LEAST)).bitmask();
                         // One product, so that it is the same to the bit from both ends.
                         let evidence = (told.evidence * (share[0] * share[1])).to_array();
-                        let apart = told.off.cmpgt(Vec4::splat(OFF)).bitmask();
+                        let may_be_parted = between.may_be_parted(told.off);
                         for ((lane, evidence), &(to, place)) in (0..).zip(evidence).zip(near) {
                             if says >> lane & 1 == 0 || to == own {
                                 continue;
                             }
-                            let step = NEAR[place as usize % 64].xyz();
-                            if apart >> lane & 1 == 0 || !between.parts(&patches.all[to], step) {
+                            if may_be_parted >> lane & 1 == 0 || !between.part(&patches.all[to], step(place)) {
                                 links.push(Link { to: to as u32, evidence });
                             }
                         }
@@ -205,6 +207,11 @@ impl Links {
     }
 }
 
+/// From a cube to that behind a bit of [`Places::near`], in edges.
+fn step(place: u32) -> Vec3 {
+    NEAR[place as usize % 64].xyz()
+}
+
 /// How often the likeness of patches is squared; `noise` is that of the points, in edges.
 fn squarings(noise: f32) -> usize {
     let root_2 = std::f32::consts::SQRT_2;
@@ -232,6 +239,8 @@ struct Told {
     off: Vec4,
     /// The same, or zero where it is no difference.
     apart: Vec4,
+    /// How far the one is off the planes of the four.
+    height: Vec4,
 }
 
 impl Four {
@@ -243,8 +252,7 @@ impl Four {
         let rows = |row: &dyn Fn(usize) -> Vec4| transposed([row(0), row(1), row(2), row(3)]);
         let [x, y, z, flatness] = rows(&|lane| patch(lane).centre.extend(patch(lane).flatness));
         let [along_x, along_y, along_z, certainty] = rows(&|lane| patch(lane).normal.extend(patch(lane).certainty()));
-        let step = |lane: usize| NEAR[near[lane].1 as usize % 64];
-        let [step_x, step_y, step_z, bend] = rows(&|lane| step(lane).xyz().extend(patch(lane).bend));
+        let [step_x, step_y, step_z, bend] = rows(&|lane| step(near[lane].1).extend(patch(lane).bend));
         Self {
             step: [step_x, step_y, step_z],
             centre: [x, y, z],
@@ -289,6 +297,7 @@ impl Four {
             evidence: Vec4::select(square.cmplt(Vec4::splat(4e-4)), alike * alike * alike, evidence),
             off,
             apart: Vec4::select(off.cmpgt(Vec4::splat(2.0 * EVEN)), off, Vec4::ZERO),
+            height: -other_along,
         }
     }
 }
@@ -388,7 +397,7 @@ mod tests {
         let (a, b) = (patch(Vec3::ZERO, Vec3::Z), patch(Vec3::new(0.0, 0.0, 0.4), Vec3::Z));
         let at = |noise: f32| evidence(&a, &b, Places::NEAR_CENTRE + 1, squarings(noise));
         assert!((0.0..1e-3).contains(&at(0.0)), "{}", at(0.0));
-        assert!(at(0.3) > 2.0 * at(0.0), "{}", at(0.3));
+        assert!(at(0.3) > 0.1, "{}", at(0.3));
     }
 
     /// Sheets close to each other, as where balls touch: each goes on in itself.
