@@ -287,7 +287,9 @@ impl Four {
         let certainty = Vec4::splat(patch.certainty());
         let certainty = Vec4::select(certainty.cmplt(self.certainty), certainty, self.certainty);
         let trust = patch.flatness * self.flatness * root(certainty);
-        let blunt = BLUNT * (1.0 - power(alike, LEAST_SQUARINGS));
+        // As `Patch::likeness`.
+        let likeness = power(alike, 4);
+        let blunt = BLUNT * (1.0 - likeness);
         let evidence = reflected * ((sharp + blunt * fourth) / (1.0 + blunt)) * (1.0 - across.abs()) * trust;
         let rise = 0.5 * square;
         let (own, other) = (along - rise * patch.bend, other_along + rise * self.bend);
