@@ -79,46 +79,50 @@ fn noise(grid: &Grid, normals: &[Vec3], scale: f32) -> f32 {
     median(&deviations) / scale
 }
 
+/// Fewer points lie on a plane in any case.
+const LEAST: usize = 4;
+
 /// That of the points of one cube, if they are enough to tell: of those with about the same normal, if these are half of them,
 /// because across the faces of an edge all normals together have no direction.
 ///
 /// From how far apart points are along the normal, one next to the other: both sides of a thin wall in one cube are no noise.
 fn deviation(points: &[Placed], normals: &[Vec3], gaps: &mut Vec<f32>) -> Option<f32> {
-    /// Fewer points lie on a plane in any case.
-    const LEAST: usize = 4;
-    /// Normals that differ by up to 45 degrees, as they do in noise: its cosine, squared.
-    const ALIKE: f32 = 0.5;
     if points.len() < LEAST {
         return None;
     }
     let own = |point: &Placed| normals[point.point as usize];
-    let like = |first: Vec3| points.iter().filter(move |point| first.dot(own(point)).powi(2) >= ALIKE);
-    let first = most_alike(points.iter().map(own), &|first| like(first).count());
-    let is_most = like(first).count() >= points.len().div_ceil(2).max(LEAST);
-    let chosen = || points.iter().filter(|point| !is_most || first.dot(own(point)).powi(2) >= ALIKE);
+    let most = most_alike(points.iter().map(own));
+    let chosen = || points.iter().filter(|point| most.is_none_or(|most| are_alike(most, own(point))));
     let normal = chosen().fold(Vec3::ZERO, |sum, point| sum + aligned(own(point), sum)).try_normalize()?;
     gaps.clear();
     gaps.extend(chosen().map(|point| point.local.dot(normal)));
     Some(median::deviation(gaps))
 }
 
-/// The normal that most others are like, as `count` tells, or zero where there are too many to ask each. Of as many the one that
-/// is so in any order of the points.
-fn most_alike(normals: impl ExactSizeIterator<Item = Vec3>, count: &dyn Fn(Vec3) -> usize) -> Vec3 {
-    /// In cubes of more points another piece of surface is hardly ever small against the cube.
+/// The normal that most others are like, if half are. Of as many the one that is so in any order of the points.
+fn most_alike(normals: impl ExactSizeIterator<Item = Vec3> + Clone) -> Option<Vec3> {
+    /// To compare each of more with each would take too long: there may be any number.
     const MANY: usize = 64;
     let all = normals.len();
+    if all > MANY {
+        return None;
+    }
     let (mut first, mut most) = (Vec3::ZERO, 0);
-    for normal in normals.take(if all > MANY { 0 } else { all }) {
-        let count = count(normal);
-        if count > most || count == most && normal.to_array() > first.to_array() {
-            (first, most) = (normal, count);
+    for one in normals.clone() {
+        let count = normals.clone().filter(|other| are_alike(one, *other)).count();
+        if count > most || count == most && one.to_array() > first.to_array() {
+            (first, most) = (one, count);
         }
         if most == all {
             break;
         }
     }
-    first
+    (most >= all.div_ceil(2).max(LEAST)).then_some(first)
+}
+
+/// Whether two normals differ by up to 45 degrees, as those of one surface do in noise.
+fn are_alike(one: Vec3, other: Vec3) -> bool {
+    one.dot(other).powi(2) >= 0.5
 }
 
 #[cfg(test)]
