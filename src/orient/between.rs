@@ -67,7 +67,7 @@ impl Between {
 
     /// A bit for each of four pairs that something may lie between; `off` are the sums of the squares of how far the two are off
     /// each other's planes.
-    pub fn may_be_parted(&self, off: Vec4) -> u32 {
+    pub fn may_lie_between(&self, off: Vec4) -> u32 {
         off.cmpgt(Vec4::splat(IN_LINE * self.off * self.off)).bitmask()
     }
 
@@ -77,8 +77,8 @@ impl Between {
         self.thirds.clear();
         self.thirds.extend(others.filter_map(|(&Patch { centre, normal, points, flatness, .. }, step, height)| {
             let line = (own.centre - centre) - step;
-            let may_part = height.abs() > self.off && points >= LEAST && flatness >= FLAT;
-            may_part.then_some(Third { step, centre, normal, line, height })
+            let may_lie_between = height.abs() > self.off && points >= LEAST && flatness >= FLAT;
+            may_lie_between.then_some(Third { step, centre, normal, line, height })
         }));
         self.fours.clear();
         self.fours.extend(self.thirds.chunks(4).map(Four::of));
@@ -86,9 +86,9 @@ impl Between {
 
     /// Whether one of them lies between the patch and another one, `step` cubes away. The same from both ends, to the bit: only
     /// what is near both counts.
-    pub fn part(&self, other: &Patch, step: Vec3) -> bool {
+    pub fn lies_before(&self, other: &Patch, step: Vec3) -> bool {
         let [step, place] = [step, other.centre].map(|vector| vector.to_array().map(Vec4::splat));
-        self.fours.iter().any(|four| four.part(place, step, self.off))
+        self.fours.iter().any(|four| four.lies_before(place, step, self.off))
     }
 }
 
@@ -111,7 +111,7 @@ impl Four {
 
     /// Whether one of the four lies between the patch and a place, `step` cubes away.
     #[inline(always)]
-    fn part(&self, place: [Vec4; 3], step: [Vec4; 3], off: f32) -> bool {
+    fn lies_before(&self, place: [Vec4; 3], step: [Vec4; 3], off: f32) -> bool {
         let dot = |a: [Vec4; 3], b: [Vec4; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let away = [0, 1, 2].map(|axis| step[axis] - self.step[axis]);
         let line = [0, 1, 2].map(|axis| (place[axis] - self.centre[axis]) + away[axis]);
@@ -143,7 +143,7 @@ mod tests {
             let near = all.filter(|(_, step)| step.abs().max_element() <= 1.0);
             let height = |patch: &Patch, step: Vec3| (own.centre - patch.centre - step).dot(patch.normal);
             between.look(&own, near.map(|(patch, step)| (patch, step, height(patch, step))));
-            between.part(&other, patches[to].1 - place)
+            between.lies_before(&other, patches[to].1 - place)
         });
         assert_eq!(there, back);
         there

@@ -118,12 +118,12 @@ impl Links {
                         let says = told.evidence.abs().cmpgt(Vec4::splat(LEAST)).bitmask();
                         // One product, so that it is the same to the bit from both ends.
                         let evidence = (told.evidence * (share[0] * share[1])).to_array();
-                        let may_be_parted = between.may_be_parted(told.off);
+                        let may_lie_between = between.may_lie_between(told.off);
                         for ((lane, evidence), &(to, place)) in (0..).zip(evidence).zip(near) {
                             if says >> lane & 1 == 0 || to == own {
                                 continue;
                             }
-                            if may_be_parted >> lane & 1 == 0 || !between.part(&patches.all[to], step(place)) {
+                            if may_lie_between >> lane & 1 == 0 || !between.lies_before(&patches.all[to], step(place)) {
                                 links.push(Link { to: to as u32, evidence });
                             }
                         }
