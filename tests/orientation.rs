@@ -198,12 +198,14 @@ fn combed(spine: f64, teeth: usize, width: f64) -> Vec<[f64; 2]> {
 }
 
 /// Fins two and a half spacings thick and teeth of four: at their ends a patch lies to the sides of the next one much as it does to
-/// its own.
+/// its own. And fins of some five spacings whose far sides are seen askew through them, because with noise they are no longer flat.
 #[test]
 fn fins_and_teeth_face_outwards() {
+    let heat_sink = combed(0.2, 13, 0.025).into_iter().map(|[x, y]| [x, 0.4 * y]).collect();
     for (name, polygon, height, noise, least) in [
         ("fins", combed(0.1, 9, 0.035), 1.0, 0.0, 0.9995),
         ("noisy fins", combed(0.1, 9, 0.035), 1.0, 0.0012, 0.99),
+        ("a noisy heat sink", heat_sink, 1.0, 0.0012, 0.99),
         ("teeth", combed(0.25, 25, 0.02), 0.03, 0.0, 0.9995),
     ] {
         let cloud = prism(100_000, 43, &polygon, height).noisy(noise, 44);

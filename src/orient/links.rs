@@ -1,6 +1,6 @@
 //! What neighbouring patches say about each other's sign.
 
-use super::between::Between;
+use super::parted::Thirds;
 use super::patches::{MOST, Patch, Patches};
 use crate::bricks::set_bits;
 use crate::error::Error;
@@ -75,7 +75,7 @@ impl Links {
             let mut surroundings = Surroundings::new();
             let (mut near, mut fours, mut links) = (Vec::new(), Vec::new(), Vec::new());
             let (mut told, mut shares) = (Vec::new(), Vec::new());
-            let mut between = Between::new(noise, GRAPH)?;
+            let mut thirds = Thirds::new(noise, GRAPH)?;
             grow(&mut near, STEPS.len() * MOST, GRAPH)?;
             grow(&mut fours, STEPS.len() * MOST / 4, GRAPH)?;
             let mut looked_at = None;
@@ -108,23 +108,19 @@ impl Links {
                 for (i, own) in all.enumerate() {
                     let start = links.len();
                     let row = i * fours.len()..(i + 1) * fours.len();
-                    let heights = told[row.clone()].iter().flat_map(|told| told.height.to_array());
-                    let others = near.iter().zip(heights);
-                    between.look(
-                        &patches.all[own],
-                        others.map(|(&(other, place), height)| (&patches.all[other], step(place), height)),
-                    );
+                    let others = near.iter().filter(|&&(other, _)| other != own);
+                    thirds.look(&patches.all[own], others.map(|&(other, place)| (step(place), &patches.all[other])));
                     for ((near, told), share) in near.chunks(4).zip(&told[row.clone()]).zip(&shares[row]) {
                         let says = told.evidence.abs().cmpgt(Vec4::splat(LEAST)).bitmask();
                         // One product, so that it is the same to the bit from both ends.
                         let evidence = (told.evidence * (share[0] * share[1])).to_array();
-                        let may_lie_between = between.may_lie_between(told.off);
-                        for ((lane, evidence), &(to, place)) in (0..).zip(evidence).zip(near) {
+                        let (may_part, off) = (thirds.may_part(told.off), told.off.to_array());
+                        for (lane, &(to, place)) in near.iter().enumerate() {
                             if says >> lane & 1 == 0 || to == own {
                                 continue;
                             }
-                            if may_lie_between >> lane & 1 == 0 || !between.lies_before(&patches.all[to], step(place)) {
-                                links.push(Link { to: to as u32, evidence });
+                            if may_part >> lane & 1 == 0 || !thirds.part(&patches.all[to], step(place), off[lane]) {
+                                links.push(Link { to: to as u32, evidence: evidence[lane] });
                             }
                         }
                     }
@@ -239,8 +235,6 @@ struct Told {
     off: Vec4,
     /// The same, or zero where it is no difference.
     apart: Vec4,
-    /// How far the one is off the planes of the four.
-    height: Vec4,
 }
 
 impl Four {
@@ -299,7 +293,6 @@ impl Four {
             evidence: Vec4::select(square.cmplt(Vec4::splat(4e-4)), alike * alike * alike, evidence),
             off,
             apart: Vec4::select(off.cmpgt(Vec4::splat(2.0 * EVEN)), off, Vec4::ZERO),
-            height: -other_along,
         }
     }
 }

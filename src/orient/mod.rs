@@ -10,7 +10,6 @@
 
 mod air;
 mod ball;
-mod between;
 mod components;
 mod cubes;
 mod ends;
@@ -20,6 +19,7 @@ mod groups;
 mod links;
 mod looks;
 mod means;
+mod parted;
 mod patches;
 mod place;
 mod sheets;
