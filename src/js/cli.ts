@@ -327,6 +327,7 @@ function surfaces({ count, largest }: Report['components'] = { count: 0, largest
   const ways = {
     air: 'outwards',
     volume: 'away from the middle',
+    touch: 'as what they touch',
     sight: 'towards what stands before them',
     view: 'towards the scanner',
     convention: 'to a side by convention',

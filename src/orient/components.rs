@@ -1,7 +1,8 @@
 //! Which side of each surface is its outside.
 
 use super::air::Sights;
-use super::patches::{Patches, signed};
+use super::links::Links;
+use super::patches::{Patches, signed, turned};
 use super::signs::{CLOSED, Signs};
 use crate::error::Error;
 use crate::grid::Grid;
@@ -51,6 +52,8 @@ pub enum Side {
     /// The volume: the surface is open, or hidden, and most of its normals point away from its middle, or if it is long and thin
     /// from the middles of its parts.
     Volume,
+    /// Another surface, which the air told: it touches that, as the inside of a hollow body does the outside at a small opening.
+    Touch,
     /// What stands before it: it is looked at from one side.
     Sight,
     /// The scanner: all of the cloud was seen from one side, or from amid it.
@@ -66,6 +69,7 @@ impl Side {
         match self {
             Self::Air => "air",
             Self::Volume => "volume",
+            Self::Touch => "touch",
             Self::Sight => "sight",
             Self::View => "view",
             Self::Convention => "convention",
@@ -102,6 +106,14 @@ const LEAST_BULGE: f64 = 0.12;
 /// The mean of normals that look all round is shorter.
 const ALL_ROUND: f64 = 0.5;
 
+/// Less evidence between a surface and those that it touches may be chance, and so may be where more than a quarter of it speaks for
+/// the other side.
+const LEAST_TOUCH: f64 = 1.0;
+const AGREED: f64 = 0.5;
+
+/// How far from what the air told surfaces are told one by the other.
+const TOUCHES: usize = 8;
+
 /// The convention, where nothing tells the side of a mean normal: whether it is to be turned.
 pub(super) fn is_below(normal: DVec3) -> bool {
     normal.dot(DVec3::new(1.0, 2.0, 4.0)) < 0.0
@@ -110,7 +122,6 @@ pub(super) fn is_below(normal: DVec3) -> bool {
 /// Sums over a component, with its normals as they were signed.
 #[derive(Clone, Copy, Default)]
 struct Sums {
-    number: u32,
     patches: u64,
     points: u64,
     place: DVec3,
@@ -196,11 +207,48 @@ fn add_up(parts: &mut Vec<Part>, corner: DVec3, all: &mut [Sums]) {
     }
 }
 
-/// Turns the components that face inwards, tells what decided and how sure that is, and numbers them by size.
+/// Tells the surfaces that the air does not tell by those that they touch and that it does, then by these, and so on.
+fn follow_touches(decided: &mut [(Decision, bool)], links: &Links, signs: &Signs) -> Result<(), Error> {
+    for _ in 0..TOUCHES {
+        let is_told = |component: u32| matches!(decided[component as usize].0.component.side, Side::Air | Side::Touch);
+        // The evidence for the signs that each has, less that against them, and all of it.
+        let mut touches = filled((0.0, 0.0), decided.len(), WHAT)?;
+        for (one, &own) in signs.component.iter().enumerate().filter(|&(_, &own)| !is_told(own)) {
+            for link in links.from(one) {
+                let (to, other) = (link.to as usize, signs.component[link.to as usize]);
+                if other != own && is_told(other) {
+                    let is_against = signs.flipped[one] ^ signs.flipped[to] ^ decided[other as usize].1;
+                    let (balance, all) = &mut touches[own as usize];
+                    *balance += f64::from(turned(is_against, link.evidence));
+                    *all += f64::from(link.evidence.abs());
+                }
+            }
+        }
+        let mut is_any_told = false;
+        for ((decision, is_inwards), (balance, all)) in decided.iter_mut().zip(touches) {
+            if balance.abs() > LEAST_TOUCH && balance.abs() > AGREED * all {
+                let is_against = balance < 0.0;
+                decision.volume = signed(is_against ^ *is_inwards, decision.volume);
+                decision.component.side = Side::Touch;
+                decision.component.confidence = balance.abs() / (2.0 * all);
+                *is_inwards = is_against;
+                is_any_told = true;
+            }
+        }
+        if !is_any_told {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Turns the components that face inwards, tells what decided and how sure that is, and numbers them by size. `links` are those of
+/// the patches, if there are any.
 pub(super) fn decide(
     grid: &Grid,
     patches: &Patches,
     sights: &Sights,
+    links: Option<&Links>,
     signs: &mut Signs,
 ) -> Result<Vec<Decision>, Error> {
     let mut all = filled(Sums::default(), signs.components, WHAT)?;
@@ -215,7 +263,6 @@ pub(super) fn decide(
         }
         let component = signs.component[i];
         let (patch, sums) = (&patches.all[i], &mut all[component as usize]);
-        sums.number = component;
         sums.patches += 1;
         sums.points += u64::from(patch.points);
         sums.exposure += f64::from(signed(signs.flipped[i], sights.exposure[i]));
@@ -238,20 +285,28 @@ pub(super) fn decide(
         let (sums, place) = (&mut all[signs.component[i] as usize], corner(brick) + local.as_dvec3());
         sums.reach += f64::from(patches.all[i].points) * place.distance(sums.place / sums.points as f64);
     }
-    all.sort_unstable_by_key(|sums| (Reverse(sums.points), sums.number));
-    let mut decisions = Vec::new();
-    reserve(&mut decisions, all.len(), WHAT)?;
-    // For each its number by size, and whether it faces inwards.
-    let mut decided = filled((0u32, false), all.len(), WHAT)?;
-    for (number, sums) in (0u32..).zip(&all) {
-        let (decision, is_inwards) = sums.decide();
-        decisions.push(decision);
-        decided[sums.number as usize] = (number, is_inwards);
+    // Here they still have their numbers.
+    let mut decided = Vec::new();
+    reserve(&mut decided, all.len(), WHAT)?;
+    decided.extend(all.iter().map(Sums::decide));
+    if let Some(links) = links {
+        follow_touches(&mut decided, links, signs)?;
+    }
+    let mut order = Vec::new();
+    reserve(&mut order, all.len(), WHAT)?;
+    order.extend(0..all.len());
+    order.sort_unstable_by_key(|&component| (Reverse(all[component].points), component));
+    // For each its number by size.
+    let mut numbers = filled(0u32, all.len(), WHAT)?;
+    for (number, &component) in (0..).zip(&order) {
+        numbers[component] = number;
     }
     for (flipped, component) in signs.flipped.iter_mut().zip(&mut signs.component) {
-        let (number, is_inwards) = decided[*component as usize];
-        *flipped ^= is_inwards;
-        *component = number;
+        *flipped ^= decided[*component as usize].1;
+        *component = numbers[*component as usize];
     }
+    let mut decisions = Vec::new();
+    reserve(&mut decisions, all.len(), WHAT)?;
+    decisions.extend(order.iter().map(|&component| decided[component].0));
     Ok(decisions)
 }

@@ -70,6 +70,11 @@ impl Groups {
         Ok(Self { levels, own, component })
     }
 
+    /// The links between patches, if there are any.
+    pub fn into_links(self) -> Option<Links> {
+        self.levels.into_iter().next().map(|level| level.links)
+    }
+
     /// How many components there are.
     pub fn components(&self) -> usize {
         self.own.len()

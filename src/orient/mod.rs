@@ -134,11 +134,13 @@ fn surfaces(
     let links = Links::of(grid, &patches, *noise, &stage.part(0.55..0.7))?;
     let groups = Groups::of(links, &sights, &patches, &stage.part(0.7..0.85))?;
     let choosing = stage.part(0.85..0.9);
-    let (mut signs, looks, scanner) = match options.orient {
+    let (choice, looks, scanner) = match options.orient {
         Orient::Outward => (outward(groups, &patches, &sights, &choosing)?, None, None),
         _ => consistent(groups, &ball, grid, &patches, *noise, &sights, &choosing)?,
     };
-    let mut decisions = decide(grid, &patches, &sights, &mut signs)?;
+    let (mut signs, links) = choice.into_signs();
+    let mut decisions = decide(grid, &patches, &sights, links.as_ref(), &mut signs)?;
+    drop(links);
     match scanner {
         Some(Scanner::At(station)) => station.turn_to_it(grid, &patches, &mut signs, &mut decisions)?,
         Some(Scanner::Towards(view)) => {
@@ -170,12 +172,12 @@ enum Scanner {
 }
 
 /// Signs that count all of the open, but of what is not closed a share: much of that sees the open with its inside.
-fn outward(groups: Groups, patches: &Patches, sights: &Sights, stage: &Stage) -> Result<Signs, Error> {
+fn outward(groups: Groups, patches: &Patches, sights: &Sights, stage: &Stage) -> Result<Choice, Error> {
     let mut choice = Choice::of(groups, patches, sights, &stage.part(0.0..0.6))?;
     if choice.is_any_open() {
         choice.be_cautious(None, sights, &stage.part(0.6..1.0))?;
     }
-    Ok(choice.into_signs())
+    Ok(choice)
 }
 
 /// Signs that trust no part of the open that may mislead: of what is not closed a share counts, beside what its patches see of
@@ -189,7 +191,7 @@ fn consistent(
     noise: f32,
     sights: &Sights,
     stage: &Stage,
-) -> Result<(Signs, Option<Looks>, Option<Scanner>), Error> {
+) -> Result<(Choice, Option<Looks>, Option<Scanner>), Error> {
     let mut choice = Choice::of(groups, patches, sights, &stage.part(0.0..0.3))?;
     let mut looks = None;
     if choice.is_any_open() {
@@ -203,7 +205,7 @@ fn consistent(
     if looks.is_some() && scanner.is_none() {
         choice.be_cautious(looks.as_ref(), sights, &stage.part(0.6..1.0))?;
     }
-    Ok((choice.into_signs(), looks, scanner))
+    Ok((choice, looks, scanner))
 }
 
 /// The view that the cloud is, if it is one: by links alone, or where these are not enough by some of the air, too. The signs are

@@ -3,6 +3,7 @@
 use super::air::Sights;
 use super::ball::STRAYS;
 use super::groups::Groups;
+use super::links::Links;
 use super::looks::Looks;
 use super::patches::{Patches, signed};
 use crate::error::Error;
@@ -93,8 +94,9 @@ impl Choice {
         &self.signs
     }
 
-    pub fn into_signs(self) -> Signs {
-        self.signs
+    /// The signs, and the links between patches, if there are any.
+    pub fn into_signs(self) -> (Signs, Option<Links>) {
+        (self.signs, self.groups.into_links())
     }
 }
 

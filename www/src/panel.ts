@@ -226,6 +226,7 @@ type Largest = NonNullable<Report['components']>['largest'][number];
 const WAYS = {
   air: ['outwards', 'inwards'],
   volume: ['away from the middle', 'towards the middle'],
+  touch: ['as what it touches', 'not as what it touches'],
   sight: ['to what stands before it', 'from what stands before it'],
   view: ['to the scanner', 'from the scanner'],
 } as const;
