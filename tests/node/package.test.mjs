@@ -17,11 +17,18 @@ test('every export is there, and nothing that only the build needs', () => {
   const paths = [
     manifest.types,
     ...Object.values(manifest.bin),
-    ...JSON.stringify(manifest.exports).match(/\.\/[^"*]*\.\w+/g),
+    ...JSON.stringify([manifest.exports, manifest.typesVersions]).match(/\.\/[^"*]*\.\w+/g),
   ];
   for (const path of paths.filter((path) => path.includes('dist'))) {
     assert.ok(existsSync(join(home, path)), path);
   }
+  // For TypeScript that does not read `exports`: the same types under the same names.
+  const older = Object.entries(manifest.typesVersions['*']).map(([name, [types]]) => [`./${name}`, types]);
+  const typed = Object.entries(manifest.exports).filter(([name, { types }]) => name !== '.' && types);
+  assert.deepEqual(
+    older,
+    typed.map(([name, { types }]) => [name, types]),
+  );
   assert.deepEqual(Object.keys(manifest.dependencies ?? {}), []);
   const files = readdirSync(home, { recursive: true }).filter((path) => statSync(join(home, path)).isFile());
   for (const file of files) {
