@@ -108,8 +108,12 @@ impl Links {
                 for (i, own) in all.enumerate() {
                     let start = links.len();
                     let row = i * fours.len()..(i + 1) * fours.len();
-                    let others = near.iter().filter(|&&(other, _)| other != own);
-                    thirds.look(&patches.all[own], others.map(|&(other, place)| (step(place), &patches.all[other])));
+                    // On a smooth surface none.
+                    if told[row.clone()].iter().any(|told| thirds.may_part(told.off) != 0) {
+                        let others = near.iter().filter(|&&(other, _)| other != own);
+                        let others = others.map(|&(other, place)| (step(place), &patches.all[other]));
+                        thirds.look(&patches.all[own], others);
+                    }
                     for ((near, told), share) in near.chunks(4).zip(&told[row.clone()]).zip(&shares[row]) {
                         let says = told.evidence.abs().cmpgt(Vec4::splat(LEAST)).bitmask();
                         // One product, so that it is the same to the bit from both ends.
