@@ -37,10 +37,11 @@ pub struct Component {
     pub points: u64,
     /// What told its outside.
     pub side: Side,
-    /// How much more speaks for that side than for the other: 0 is a guess, 1 is sure. By the air of all that is seen of the
-    /// open how much more is seen from one side; for what sees nothing of it how much volume there is, of that of a sphere, or
-    /// of its pieces; by sight, half of how much more looks at one side, of all that does; by view, up to a half, or from amid the
-    /// surfaces how well their densities tell where the scanner was.
+    /// How much more speaks for that side than for the other: 0 is a guess, 1 is sure. By the air of all that is seen of the open
+    /// how much more is seen from one side; for what sees nothing of it how much volume there is, of that of a sphere, or of its
+    /// pieces; by touch, half of how much more evidence speaks for that side, of all and of what is needed; by sight, half of how
+    /// much more looks at one side, of all that does; by view, up to a half, or from amid the surfaces how well their densities
+    /// tell where the scanner was.
     pub confidence: f64,
 }
 
@@ -52,7 +53,8 @@ pub enum Side {
     /// The volume: the surface is open, or hidden, and most of its normals point away from its middle, or if it is long and thin
     /// from the middles of its parts.
     Volume,
-    /// Another surface, which the air told: it touches that, as the inside of a hollow body does the outside at a small opening.
+    /// Another surface, which the air told, or which was told in this way: it touches that, as the inside of a hollow body does the
+    /// outside at a small opening.
     Touch,
     /// What stands before it: it is looked at from one side.
     Sight,
@@ -106,13 +108,14 @@ const LEAST_BULGE: f64 = 0.12;
 /// The mean of normals that look all round is shorter.
 const ALL_ROUND: f64 = 0.5;
 
-/// Less evidence between a surface and those that it touches may be chance, and so may be where more than a quarter of it speaks for
-/// the other side.
+/// Less evidence than this between a surface and those that it touches may be chance, or than so much for each patch along its side,
+/// and so may be where more than a quarter of it speaks for the other side.
 const LEAST_TOUCH: f64 = 1.0;
-const AGREED: f64 = 0.5;
+const LEAST_ALONG: f64 = 0.03;
+const THREE_TO_ONE: f64 = 0.5;
 
 /// How far from what the air told surfaces are told one by the other.
-const TOUCHES: usize = 8;
+const ROUNDS: usize = 8;
 
 /// The convention, where nothing tells the side of a mean normal: whether it is to be turned.
 pub(super) fn is_below(normal: DVec3) -> bool {
@@ -209,10 +212,15 @@ fn add_up(parts: &mut Vec<Part>, corner: DVec3, all: &mut [Sums]) {
 
 /// Tells the surfaces that the air does not tell by those that they touch and that it does, then by these, and so on.
 fn follow_touches(decided: &mut [(Decision, bool)], links: &Links, signs: &Signs) -> Result<(), Error> {
-    for _ in 0..TOUCHES {
-        let is_told = |component: u32| matches!(decided[component as usize].0.component.side, Side::Air | Side::Touch);
+    let is_told = |decision: &Decision| matches!(decision.component.side, Side::Air | Side::Touch);
+    for _ in 0..ROUNDS {
+        let told = decided.iter().filter(|(decision, _)| is_told(decision)).count();
+        if told == 0 || told == decided.len() {
+            break;
+        }
         // The evidence for the signs that each has, less that against them, and all of it.
         let mut touches = filled((0.0, 0.0), decided.len(), WHAT)?;
+        let is_told = |component: u32| is_told(&decided[component as usize].0);
         for (one, &own) in signs.component.iter().enumerate().filter(|&(_, &own)| !is_told(own)) {
             for link in links.from(one) {
                 let (to, other) = (link.to as usize, signs.component[link.to as usize]);
@@ -226,11 +234,12 @@ fn follow_touches(decided: &mut [(Decision, bool)], links: &Links, signs: &Signs
         }
         let mut is_any_told = false;
         for ((decision, is_inwards), (balance, all)) in decided.iter_mut().zip(touches) {
-            if balance.abs() > LEAST_TOUCH && balance.abs() > AGREED * all {
+            let least = LEAST_TOUCH.max(LEAST_ALONG * (decision.patches as f64).sqrt());
+            if balance.abs() > least && balance.abs() > THREE_TO_ONE * all {
                 let is_against = balance < 0.0;
                 decision.volume = signed(is_against ^ *is_inwards, decision.volume);
                 decision.component.side = Side::Touch;
-                decision.component.confidence = balance.abs() / (2.0 * all);
+                decision.component.confidence = balance.abs() / (2.0 * (all + least));
                 *is_inwards = is_against;
                 is_any_told = true;
             }
@@ -309,4 +318,35 @@ pub(super) fn decide(
     reserve(&mut decisions, all.len(), WHAT)?;
     decisions.extend(order.iter().map(|&component| decided[component].0));
     Ok(decisions)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::links::Link;
+    use super::*;
+
+    /// Surfaces of one patch each, the first told by the air, with its normal inwards; of the others `volume` has their signs so far.
+    #[test]
+    fn a_surface_goes_by_what_it_touches() {
+        let evidence = [(0, 1, 2.0), (1, 2, -2.0), (0, 3, 3.0), (0, 3, -1.5), (0, 4, 0.9), (2, 5, -2.0)];
+        let told = evidence.map(|(from, to, evidence)| (from, Link { to, evidence }));
+        let links = Links::both_ways(6, told.into_iter()).unwrap();
+        let signs = Signs {
+            flipped: vec![false, true, false, false, false, false],
+            component: (0..6).collect(),
+            components: 6,
+        };
+        let decided = |side| {
+            let component = Component { points: 16, side, confidence: 0.0 };
+            (Decision { component, patches: 1, volume: 0.2 }, side == Side::Air)
+        };
+        let mut all = [Side::Air, Side::Volume, Side::Volume, Side::Volume, Side::Volume, Side::Volume].map(decided);
+        follow_touches(&mut all, &links, &signs).unwrap();
+        // The fourth is contradicted, and the fifth hardly touches.
+        let sides = all.map(|(decision, _)| decision.component.side);
+        assert_eq!(sides, [Side::Air, Side::Touch, Side::Touch, Side::Volume, Side::Volume, Side::Touch]);
+        // Who agrees with the first is turned as it is, unless flipped already; the last is at odds with the third.
+        assert_eq!(all.map(|(_, is_inwards)| is_inwards), [true, false, false, false, false, true]);
+        assert_eq!(all.map(|(decision, _)| decision.volume), [0.2, 0.2, 0.2, 0.2, 0.2, -0.2]);
+    }
 }

@@ -17,7 +17,8 @@ use glam::{BVec4A, Vec3, Vec4};
 const OFF: f32 = 0.2;
 const DEVIATIONS: f32 = 2.0;
 
-/// One is before or behind another if it is as far off, or so many deviations: noise tears a sheet into layers.
+/// One lies before or behind a third one if it is as far off its plane, in edges, and so many deviations: noise tears a sheet into
+/// layers.
 const LAYERS: f32 = 3.0;
 
 /// What the squares of how far two are off each other's planes add up to, against that limit squared, where a third one may part
@@ -46,8 +47,9 @@ const FLAT: f32 = 0.8;
 
 /// The patches near one that may part it from others.
 pub(super) struct Thirds {
-    /// How far two are off a third one that lies between them, and one is off another behind it.
+    /// How far two are at least off the plane of one that lies between them.
     off: f32,
+    /// How far one is at least off the plane of one before or behind it.
     apart: f32,
     /// From the cube of that patch to theirs, in edges, and they.
     thirds: Vec<(Vec3, Patch)>,
@@ -68,7 +70,8 @@ struct Four {
 struct Lies {
     /// Off their planes.
     height: Vec4,
-    /// The squares of that and of how far they are off its own, added up.
+    /// The squares of that and of how far they are off its own, added up; not off what the patches bend to, as `Told::off` is, which
+    /// few do.
     off: Vec4,
     /// Beside them, squared.
     beside: Vec4,
@@ -238,14 +241,17 @@ mod tests {
         assert!(!are_parted([outer, next(2.7), leaf(next(3.4))]));
     }
 
+    /// Bent as closely as round a rod of two edges' radius: there only those nearly two edges from each other would be.
     #[test]
     fn nothing_parts_a_surface() {
-        for bend in [-0.5, 0.5] {
+        for bend in [-0.5, -0.2, 0.2, 0.5] {
             let on_arc = |angle: f32| {
                 let normal = Vec3::new(angle.sin(), 0.0, angle.cos());
                 (patch((normal - Vec3::Z) / bend, normal), Vec3::ZERO)
             };
-            assert!(!are_parted([on_arc(-0.3), on_arc(0.3), on_arc(0.0)]));
+            for angle in [0.1, 0.2, 0.3, 0.4] {
+                assert!(!are_parted([on_arc(-angle), on_arc(angle), on_arc(0.0)]), "{bend} {angle}");
+            }
         }
     }
 
