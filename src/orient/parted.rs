@@ -129,10 +129,13 @@ impl Four {
     fn part(&self, other: &Patch, step: Vec3, off: f32, limits: &Thirds) -> bool {
         let [step, place] = [step, other.centre].map(|vector| vector.to_array().map(Vec4::splat));
         let away = [0, 1, 2].map(|axis| step[axis] - self.step[axis]);
-        let line = [0, 1, 2].map(|axis| (place[axis] - self.centre[axis]) + away[axis]);
-        let lies = Lies::of(other, line, self.normal);
         let [near_x, near_y, near_z] = away.map(|away| away.abs().cmple(Vec4::ONE));
         let is_near = near_x & near_y & near_z;
+        if !is_near.any() {
+            return false;
+        }
+        let line = [0, 1, 2].map(|axis| (place[axis] - self.centre[axis]) + away[axis]);
+        let lies = Lies::of(other, line, self.normal);
         (is_near & (self.lie_between(line, &lies, limits.off) | self.lies.are_apart(&lies, off, limits.apart))).any()
     }
 
