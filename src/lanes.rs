@@ -1,4 +1,4 @@
-//! Four numbers at once, where glam 0.34 takes them one by one, and the transposed of four times four.
+//! Four numbers at once, where glam 0.34 takes them one by one, four vectors, and the transposed of four times four.
 
 use glam::{Mat4, Vec4};
 use std::simd::{StdFloat, f32x4, simd_swizzle};
@@ -21,6 +21,12 @@ pub(crate) fn after(before: Vec4, four: Vec4) -> Vec4 {
 pub(crate) fn transposed([a, b, c, d]: [Vec4; 4]) -> [Vec4; 4] {
     let Mat4 { x_axis, y_axis, z_axis, w_axis } = Mat4::from_cols(a, b, c, d).transpose();
     [x_axis, y_axis, z_axis, w_axis]
+}
+
+/// The product of vectors, lane by lane.
+#[inline(always)]
+pub(crate) fn dot(a: [Vec4; 3], b: [Vec4; 3]) -> Vec4 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// What is above zero, and zero for the rest: in WebAssembly maxima take several times as long.

@@ -8,10 +8,10 @@
 use super::around::Near;
 use super::choose::Chosen;
 use super::level::Level;
-use super::matrix::{Matrix, dot_lanes};
+use super::matrix::Matrix;
 use super::surface::plane_of;
 use crate::grid::located;
-use crate::lanes::{power, transposed};
+use crate::lanes::{dot, power, transposed};
 use crate::lattice::cube_centre;
 use crate::normals::SHORT;
 use crate::pca::Symmetric;
@@ -303,7 +303,7 @@ impl Faces {
             (0..3).for_each(|axis| sum[axis] += sine * face.plane[axis]);
         }
         // Amid a prism three may add up to nothing.
-        let is_long = dot_lanes(sum, sum).cmpgt(Vec4::splat(SHORT * SHORT));
+        let is_long = dot(sum, sum).cmpgt(Vec4::splat(SHORT * SHORT));
         std::array::from_fn(|axis| Vec4::select(is_long, sum[axis], Vec4::splat(self.all[0].plane[axis])))
     }
 }

@@ -9,9 +9,8 @@
 use super::around::{Around, Near};
 use super::choose::Chosen;
 use super::level::Level;
-use super::matrix::dot_lanes;
 use crate::grid::Placed;
-use crate::lanes::{load, transposed};
+use crate::lanes::{dot, load, transposed};
 use crate::lattice::cube_centre;
 use crate::median;
 use crate::points::spread;
@@ -322,7 +321,7 @@ fn clear(offsets: &[[Vec4; 3]], normal: Vec3, square: f32) -> f32 {
     let (on, nearly) = (Vec4::splat(ON * square), Vec4::splat(NEARLY * square));
     let mut sum = Vec4::ZERO;
     for &four in offsets {
-        let height = dot_lanes(four, normal);
+        let height = dot(four, normal);
         let height = height * height;
         let others = Vec4::select(height.cmple(nearly), Vec4::NEG_ONE, Vec4::ZERO);
         sum += Vec4::select(height.cmple(on), Vec4::ONE, others);
@@ -374,7 +373,7 @@ fn on(points: &[[f32; NEXT]; 3], range: Range<usize>, normal: Vec3, limit: f32) 
     let normal = normal.to_array().map(Vec4::splat);
     let mut count = Vec4::ZERO;
     for i in range.step_by(4) {
-        let height = dot_lanes(points.each_ref().map(|numbers| load(&numbers[i..])), normal);
+        let height = dot(points.each_ref().map(|numbers| load(&numbers[i..])), normal);
         count += Vec4::select((height * height).cmple(Vec4::splat(limit)), Vec4::ONE, Vec4::ZERO);
     }
     count.element_sum()

@@ -1,4 +1,4 @@
-//! Symmetric matrices and vectors, one or four at a time.
+//! Symmetric matrices, one or four at a time.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat3, Vec3, Vec4};
@@ -52,10 +52,4 @@ impl Matrix {
 #[inline(always)]
 pub(super) fn times_lanes([d, o]: [[Vec4; 3]; 2], [x, y, z]: [Vec4; 3]) -> [Vec4; 3] {
     [d[0] * x + o[2] * y + o[1] * z, o[2] * x + d[1] * y + o[0] * z, o[1] * x + o[0] * y + d[2] * z]
-}
-
-/// The product of vectors, lane by lane.
-#[inline(always)]
-pub(super) fn dot_lanes(a: [Vec4; 3], b: [Vec4; 3]) -> Vec4 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

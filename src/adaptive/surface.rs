@@ -1,7 +1,8 @@
 //! A quadratic surface through the samples of a neighbourhood, and how much its normals are to be trusted.
 
-use super::matrix::{Matrix, dot_lanes, times_lanes};
+use super::matrix::{Matrix, times_lanes};
 use super::samples::Window;
+use crate::lanes::dot;
 use crate::pca::Symmetric;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3, Vec4};
@@ -314,15 +315,15 @@ impl Window {
                 let bend = bend.splat();
                 let d = [x - centre.x, y - centre.y, z - centre.z];
                 let [a, b, c] = times_lanes(bend, d);
-                let sag = dot_lanes(bend[0], spread[0]) + 2.0 * dot_lanes(bend[1], spread[1]);
-                let height = dot_lanes(d, slope.to_array().map(Vec4::splat)) + 0.5 * (dot_lanes(d, [a, b, c]) + sag);
+                let sag = dot(bend[0], spread[0]) + 2.0 * dot(bend[1], spread[1]);
+                let height = dot(d, slope.to_array().map(Vec4::splat)) + 0.5 * (dot(d, [a, b, c]) + sag);
                 let normal = [a + slope.x, b + slope.y, c + slope.z];
                 let turned = times_lanes(spread, normal);
-                let scale = 1.0 / dot_lanes(normal, normal);
-                let within = scale * dot_lanes(normal, turned);
+                let scale = 1.0 / dot(normal, normal);
+                let within = scale * dot(normal, turned);
                 // As if the points lay alike in all directions of the surface.
                 let along = (0.5 * (xx + yy + zz - within)).max(Vec4::splat(f32::MIN_POSITIVE));
-                let explained = (scale * dot_lanes(turned, turned) - within * within) / along;
+                let explained = (scale * dot(turned, turned) - within * within) / along;
                 // Rounding may leave anything.
                 let explained = explained.max(Vec4::ZERO).min(within);
                 // A plane takes three points, and of samples with no more nothing is left.

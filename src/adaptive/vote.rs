@@ -5,14 +5,14 @@ use super::choose::Chosen;
 use super::faces::{CLEAN, Faces};
 use super::facets::{Facets, TORN};
 use super::level::{Level, Role};
-use super::matrix::{dot_lanes, times_lanes};
+use super::matrix::times_lanes;
 use super::sheets::Sheets;
 use super::surface::Surface;
 use super::tally::Tally;
 use super::{DIVISIONS, WHAT};
 use crate::error::Error;
 use crate::grid::located;
-use crate::lanes::{after, inverse_root, power, root, transposed};
+use crate::lanes::{after, dot, inverse_root, power, root, transposed};
 use crate::lattice::cube_centre;
 use crate::normals::{Normals, SHORT, Writer};
 use crate::parallel::Filling;
@@ -385,9 +385,9 @@ impl Voters {
         let d = std::array::from_fn(|axis| place[axis] - self.centre[axis]);
         let bend = times_lanes(self.bend, d);
         let slope: [Vec4; 3] = std::array::from_fn(|axis| self.slope[axis] + bend[axis]);
-        let height = self.height + dot_lanes(d, self.slope) + 0.5 * dot_lanes(d, bend);
-        let square = dot_lanes(slope, slope).max(Vec4::splat(f32::MIN_POSITIVE));
-        let far = dot_lanes(d, d) * (0.5 / (SPEAK * SPEAK)) + self.fall * height * height / square;
+        let height = self.height + dot(d, self.slope) + 0.5 * dot(d, bend);
+        let square = dot(slope, slope).max(Vec4::splat(f32::MIN_POSITIVE));
+        let far = dot(d, d) * (0.5 / (SPEAK * SPEAK)) + self.fall * height * height / square;
         let scale = inverse_root(square);
         Votes {
             weight: fade(far) * self.weight,
@@ -490,7 +490,7 @@ impl Ballot {
         let deviation = tolerance + best.error.sqrt();
         let mut sums = [Vec4::ZERO; 9];
         for (votes, voters) in self.votes.iter().zip(&self.voters) {
-            let cosine = dot_lanes(normal, votes.normal);
+            let cosine = dot(normal, votes.normal);
             let limit = deviation + root(voters.error);
             if (1.0 - cosine * cosine).cmpgt(limit * limit).any() {
                 return None;
@@ -522,21 +522,21 @@ impl Ballot {
         let height = Vec4::splat(best.height);
         let mut sum = [Vec4::ZERO; 3];
         for (votes, voters) in self.votes.iter().zip(&self.voters) {
-            let mut side = dot_lanes(normal, votes.normal);
+            let mut side = dot(normal, votes.normal);
             let mut weight = votes.weight / best.weight;
             let is_turned = side.abs().cmple(Vec4::splat(FRAC_1_SQRT_2));
             if is_turned.any() {
                 // Round an edge. Each of the two ends at the other, on the side where its centre lies: the further the point's
                 // foot on it lies inside, the more it counts, `1 / (1 + exp(-inside))`.
                 let across = std::array::from_fn(|axis| voters.centre[axis] - centre[axis]);
-                let (rise, drop) = (dot_lanes(across, normal), dot_lanes(across, votes.normal));
+                let (rise, drop) = (dot(across, normal), dot(across, votes.normal));
                 let unit = END * root(voters.fall.min(Vec4::splat(best.fall)));
                 let doubt = |inside: Vec4| 1.0 + fade((unit * inside).max(Vec4::splat(BEYOND)));
                 let of_best = doubt((height * side - votes.height) * drop.signum());
                 let of_other = doubt((height - votes.height * side) * rise.signum());
                 weight *= Vec4::select(is_turned, of_best / of_other, Vec4::ONE);
                 // Reflected at the plane between the two, as on an arc.
-                let reflected = dot_lanes(across, across) * side - 2.0 * rise * drop;
+                let reflected = dot(across, across) * side - 2.0 * rise * drop;
                 side = Vec4::select(is_turned, reflected, side);
             }
             let weight = Vec4::select(side.cmplt(Vec4::ZERO), -weight, weight);

@@ -5,7 +5,7 @@ use super::patches::{MOST, Patch, Patches};
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
-use crate::lanes::{power, root, transposed};
+use crate::lanes::{dot, power, root, transposed};
 use crate::lists::{filled, fitted, grow, reserve, starts};
 use crate::parallel::Filling;
 use crate::progress::Stage;
@@ -270,8 +270,6 @@ impl Four {
     /// normals is no evidence, as noise of one surface and both sides of a wall look the same.
     #[inline(always)]
     fn look(&self, patch: &Patch, squarings: usize) -> Told {
-        let dot =
-            |[x, y, z]: [Vec4; 3], [other_x, other_y, other_z]: [Vec4; 3]| x * other_x + y * other_y + z * other_z;
         let splat = |vector: Vec3| vector.to_array().map(Vec4::splat);
         let (centre, normal) = (splat(patch.centre), splat(patch.normal));
         // So that the other way round it is the opposite to the bit.

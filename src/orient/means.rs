@@ -18,7 +18,7 @@ use super::signs::Signs;
 use super::support::Support;
 use crate::bricks::set_bits;
 use crate::error::Error;
-use crate::lanes::{load, positive, root, transposed};
+use crate::lanes::{dot, load, positive, root, transposed};
 use crate::lists::grow;
 use crate::parallel::Scatter;
 use crate::points::Points;
@@ -299,7 +299,6 @@ impl Cube {
 /// What the normals within an edge say of a position, the nearer the more: the mean of their fields as dipoles, which are as
 /// smooth as if each were `soft` beside the position. The more they contradict each other, the shorter it is.
 fn mean<'a>(cubes: impl Iterator<Item = &'a Cube>, position: Vec3, soft: f32) -> Vec3 {
-    let dot = |[ax, ay, az]: [Vec4; 3], [bx, by, bz]: [Vec4; 3]| ax * bx + ay * by + az * bz;
     let [x, y, z] = position.to_array().map(Vec4::splat);
     let soft = Vec4::splat(soft * soft);
     let (mut sums, mut total) = ([Vec4::ZERO; 3], Vec4::ZERO);

@@ -7,7 +7,7 @@
 
 use super::patches::{MOST, Patch};
 use crate::error::Error;
-use crate::lanes::transposed;
+use crate::lanes::{dot, transposed};
 use crate::lists::grow;
 use crate::surroundings::STEPS;
 use glam::{BVec4A, Vec3, Vec4};
@@ -175,11 +175,6 @@ impl Lies {
         };
         is_behind(self) & goes_on(other) | is_behind(other) & goes_on(self)
     }
-}
-
-#[inline(always)]
-fn dot(a: [Vec4; 3], b: [Vec4; 3]) -> Vec4 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::sheets::{self, Doubt};
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::{Grid, Placed, located};
-use crate::lanes::{root, transposed};
+use crate::lanes::{dot, root, transposed};
 use crate::lattice::{BRICK, cube_centre};
 use crate::lists::{concatenated, grow, reserve, starts};
 use crate::order::sort_few;
@@ -434,7 +434,6 @@ impl Sums {
 
     /// The patch that a point fits best, if any, and whether its normal is opposite.
     fn best(&self, place: Vec3, normal: Vec3, limits: Limits) -> Option<(usize, bool)> {
-        let dot = |[ax, ay, az]: [Vec4; 3], [bx, by, bz]: [Vec4; 3]| ax * bx + ay * by + az * bz;
         let [place, own] = [place, normal].map(|one| one.to_array().map(Vec4::splat));
         let (mut best, mut least) = (None, f32::INFINITY);
         for (four, &FourSums { centre, normal, points }) in self.fours[..self.count.div_ceil(4)].iter().enumerate() {
