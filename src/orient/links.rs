@@ -1,11 +1,12 @@
 //! What neighbouring patches say about each other's sign.
 
+use super::fours::{Four, first_four};
 use super::parted::Thirds;
 use super::patches::{MOST, Patch, Patches};
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
-use crate::lanes::{dot, power, root, transposed};
+use crate::lanes::{dot, power, root};
 use crate::lists::{filled, fitted, grow, reserve, starts};
 use crate::parallel::Filling;
 use crate::progress::Stage;
@@ -89,7 +90,8 @@ impl Links {
                     near.extend(of_place(place).map(|patch| (patch, place)));
                 }
                 fours.clear();
-                fours.extend(near.chunks(4).map(|near| Four::of(patches, near)));
+                let placed = |(patch, place): (usize, u32)| (step(place), &patches.all[patch]);
+                fours.extend(near.chunks(4).map(|near| Four::of(first_four(near).map(placed))));
                 let all = patches.of_cube(cube);
                 // For each patch of the cube those near it, four by four.
                 let pairs = all.len() * fours.len();
@@ -98,21 +100,24 @@ impl Links {
                 grow(&mut told, pairs, GRAPH)?;
                 grow(&mut shares, pairs, GRAPH)?;
                 told.extend(
-                    all.clone().flat_map(|own| fours.iter().map(move |four| four.look(&patches.all[own], squarings))),
+                    all.clone()
+                        .flat_map(|own| fours.iter().map(move |four| Told::of(four, &patches.all[own], squarings))),
                 );
                 shares.resize(pairs, [Vec4::ONE; 2]);
                 if is_clean && near.iter().any(|&(patch, _)| patches.all[patch].has_rival) {
                     share(&patches.all, &near, &told, &mut shares);
                 }
+                // On a smooth surface none are.
+                let may_be_parted = told.iter().any(|told| thirds.may_part(told.off) != 0);
+                if may_be_parted {
+                    thirds.gather(near.iter().copied().map(placed));
+                }
                 grow(&mut links, all.len() * near.len(), GRAPH)?;
                 for (i, own) in all.enumerate() {
                     let start = links.len();
                     let row = i * fours.len()..(i + 1) * fours.len();
-                    // On a smooth surface none.
-                    if told[row.clone()].iter().any(|told| thirds.may_part(told.off) != 0) {
-                        let others = near.iter().filter(|&&(other, _)| other != own);
-                        let others = others.map(|&(other, place)| (step(place), &patches.all[other]));
-                        thirds.look(&patches.all[own], others);
+                    if may_be_parted {
+                        thirds.look(&patches.all[own]);
                     }
                     for ((near, told), share) in near.chunks(4).zip(&told[row.clone()]).zip(&shares[row]) {
                         let says = told.evidence.abs().cmpgt(Vec4::splat(LEAST)).bitmask();
@@ -220,17 +225,6 @@ fn squarings(noise: f32) -> usize {
         .unwrap_or(MOST_SQUARINGS)
 }
 
-/// Four patches near one, number for number in lanes.
-struct Four {
-    /// From the cube of that one to theirs, in edges.
-    step: [Vec4; 3],
-    centre: [Vec4; 3],
-    normal: [Vec4; 3],
-    bend: Vec4,
-    flatness: Vec4,
-    certainty: Vec4,
-}
-
 /// What four patches and another one say to each other.
 struct Told {
     /// Whether they agree.
@@ -241,27 +235,8 @@ struct Told {
     apart: Vec4,
 }
 
-impl Four {
-    /// At most four, by number and by bit of [`Places::near`]; then the last of them once more.
-    #[inline(always)]
-    fn of(patches: &Patches, near: &[(usize, u32)]) -> Self {
-        let near: [(usize, u32); 4] = std::array::from_fn(|lane| near[lane.min(near.len() - 1)]);
-        let patch = |lane: usize| &patches.all[near[lane].0];
-        let rows = |row: &dyn Fn(usize) -> Vec4| transposed([row(0), row(1), row(2), row(3)]);
-        let [x, y, z, flatness] = rows(&|lane| patch(lane).centre.extend(patch(lane).flatness));
-        let [along_x, along_y, along_z, certainty] = rows(&|lane| patch(lane).normal.extend(patch(lane).certainty()));
-        let [step_x, step_y, step_z, bend] = rows(&|lane| step(near[lane].1).extend(patch(lane).bend));
-        Self {
-            step: [step_x, step_y, step_z],
-            centre: [x, y, z],
-            normal: [along_x, along_y, along_z],
-            bend,
-            flatness,
-            certainty,
-        }
-    }
-
-    /// What each says about a patch of that cube.
+impl Told {
+    /// What each of four says about a patch of the cube that they are near.
     ///
     /// The first normal is reflected at the plane across the line between their centres: so the normals at both ends of an arc
     /// of a circle are each other's picture, also at a right-angled crease and on the two sides of a thin plate, where the
@@ -269,28 +244,28 @@ impl Four {
     /// data sets", 2004). The less alike the picture, the more likely these are two sheets: hence the power. A line along the
     /// normals is no evidence, as noise of one surface and both sides of a wall look the same.
     #[inline(always)]
-    fn look(&self, patch: &Patch, squarings: usize) -> Told {
+    fn of(four: &Four, patch: &Patch, squarings: usize) -> Self {
         let splat = |vector: Vec3| vector.to_array().map(Vec4::splat);
         let (centre, normal) = (splat(patch.centre), splat(patch.normal));
         // So that the other way round it is the opposite to the bit.
-        let line = [0, 1, 2].map(|axis| self.step[axis] + (self.centre[axis] - centre[axis]));
-        let (square, alike) = (dot(line, line), dot(normal, self.normal));
-        let (along, other_along) = (dot(line, normal), dot(line, self.normal));
+        let line = [0, 1, 2].map(|axis| four.step[axis] + (four.centre[axis] - centre[axis]));
+        let (square, alike) = (dot(line, line), dot(normal, four.normal));
+        let (along, other_along) = (dot(line, normal), dot(line, four.normal));
         let across = along * other_along / square;
         let reflected = alike - 2.0 * across;
         let fourth = power(reflected, LEAST_SQUARINGS);
         let sharp = power(fourth, squarings - LEAST_SQUARINGS);
         let certainty = Vec4::splat(patch.certainty());
-        let certainty = Vec4::select(certainty.cmplt(self.certainty), certainty, self.certainty);
-        let trust = patch.flatness * self.flatness * root(certainty);
+        let certainty = Vec4::select(certainty.cmplt(four.certainty), certainty, four.certainty);
+        let trust = patch.flatness * four.flatness * root(certainty);
         // As `Patch::likeness`.
         let likeness = power(alike, 4);
         let blunt = BLUNT * (1.0 - likeness);
         let evidence = reflected * ((sharp + blunt * fourth) / (1.0 + blunt)) * (1.0 - across.abs()) * trust;
         let rise = 0.5 * square;
-        let (own, other) = (along - rise * patch.bend, other_along + rise * self.bend);
+        let (own, other) = (along - rise * patch.bend, other_along + rise * four.bend);
         let off = own * own + other * other + EVEN;
-        Told {
+        Self {
             // In one place: between centres less than a fiftieth of an edge apart there is no line, only two normals that cross.
             evidence: Vec4::select(square.cmplt(Vec4::splat(4e-4)), alike * alike * alike, evidence),
             off,
@@ -365,13 +340,8 @@ mod tests {
         Patch { centre, normal, points: 16, flatness: 1.0, has_rival: false, bend: 0.0 }
     }
 
-    fn look(a: &Patch, b: &Patch, step: u32, squarings: usize) -> Told {
-        let patches = Patches { all: vec![*b], first: vec![0, 1] };
-        Four::of(&patches, &[(0, step)]).look(a, squarings)
-    }
-
-    fn evidence(a: &Patch, b: &Patch, step: u32, squarings: usize) -> f32 {
-        look(a, b, step, squarings).evidence.x
+    fn evidence(a: &Patch, b: &Patch, place: u32, squarings: usize) -> f32 {
+        Told::of(&Four::of([(step(place), b); 4]), a, squarings).evidence.x
     }
 
     #[test]
@@ -404,8 +374,9 @@ mod tests {
         let patches = [near(0.0), near(0.0), near(0.1), patch(Vec3::ZERO, Vec3::X)];
         let (own, next) = (Places::NEAR_CENTRE, Places::NEAR_CENTRE + 1);
         let shares_of = |near: &[(usize, u32)]| {
-            let all = Patches { all: patches.to_vec(), first: vec![0, 1, 4] };
-            let told: Vec<Told> = near.chunks(4).map(|near| Four::of(&all, near).look(&patches[0], 5)).collect();
+            let placed = |(patch, place): (usize, u32)| (step(place), &patches[patch]);
+            let fours = near.chunks(4).map(|near| Four::of(first_four(near).map(placed)));
+            let told: Vec<Told> = fours.map(|four| Told::of(&four, &patches[0], 5)).collect();
             let mut shares = vec![[Vec4::ONE; 2]; told.len()];
             share(&patches, near, &told, &mut shares);
             assert!(shares.iter().all(|share| share[1] == Vec4::ONE));

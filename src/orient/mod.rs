@@ -15,6 +15,7 @@ mod cubes;
 mod ends;
 mod eye;
 mod facing;
+mod fours;
 mod groups;
 mod links;
 mod looks;

@@ -5,9 +5,10 @@
 //! third one. Nor does it leave a sheet for another one that lies before or behind that: where a thin shell bends, the two sides of
 //! it, seen askew, are in line almost as parts of one side are.
 
+use super::fours::{Four, first_four};
 use super::patches::{MOST, Patch};
 use crate::error::Error;
-use crate::lanes::{dot, transposed};
+use crate::lanes::dot;
 use crate::lists::grow;
 use crate::surroundings::STEPS;
 use glam::{BVec4A, Vec3, Vec4};
@@ -45,29 +46,23 @@ const ALIKE: f32 = 0.2;
 const LEAST: u32 = 4;
 const FLAT: f32 = 0.8;
 
-/// The patches near one that may part it from others.
+/// What is near a cube, and may part patches of that from others.
 pub(super) struct Thirds {
     /// How far two are at least off the plane of one that lies between them.
     off: f32,
     /// How far one is at least off the plane of one before or behind it.
     apart: f32,
-    /// From the cube of that patch to theirs, in edges, and they.
-    thirds: Vec<(Vec3, Patch)>,
+    /// From the cube to theirs, in edges, and they; and the same four by four.
+    near: Vec<(Vec3, Patch)>,
     fours: Vec<Four>,
-}
-
-/// Four of them, lane by lane; where there are fewer, the last one again.
-struct Four {
-    step: [Vec4; 3],
-    centre: [Vec4; 3],
-    normal: [Vec4; 3],
-    /// From their centres to that patch, and how it lies to them.
-    line: [Vec4; 3],
-    lies: Lies,
+    /// How the patch that looks lies to them.
+    own: Vec<Lies>,
 }
 
 /// How a patch lies to four others.
 struct Lies {
+    /// From their centres to its own.
+    line: [Vec4; 3],
     /// Off their planes.
     height: Vec4,
     /// The squares of that and of how far they are off its own, added up; not off what the patches bend to, as `Told::off` is, which
@@ -80,12 +75,13 @@ struct Lies {
 }
 
 impl Thirds {
-    /// With room for all that are near a patch; `noise` is that of the points, in edges.
+    /// With room for all that is near a cube; `noise` is that of the points, in edges.
     pub fn new(noise: f32, what: &str) -> Result<Self, Error> {
-        let (mut thirds, mut fours) = (Vec::new(), Vec::new());
-        grow(&mut thirds, STEPS.len() * MOST, what)?;
+        let (mut near, mut fours, mut own) = (Vec::new(), Vec::new(), Vec::new());
+        grow(&mut near, STEPS.len() * MOST, what)?;
         grow(&mut fours, STEPS.len() * MOST / 4, what)?;
-        Ok(Self { off: OFF.max(DEVIATIONS * noise), apart: OFF.max(LAYERS * noise), thirds, fours })
+        grow(&mut own, STEPS.len() * MOST / 4, what)?;
+        Ok(Self { off: OFF.max(DEVIATIONS * noise), apart: OFF.max(LAYERS * noise), near, fours, own })
     }
 
     /// A bit for each of four pairs that something may part; `off` are the sums of the squares of how far the two are off each
@@ -94,76 +90,67 @@ impl Thirds {
         off.cmpgt(Vec4::splat(IN_LINE * self.off * self.off)).bitmask()
     }
 
-    /// Looks at what is near a patch: patches, each with what lies between the cube of that one and its own.
-    pub fn look<'a>(&mut self, own: &Patch, near: impl Iterator<Item = (Vec3, &'a Patch)>) {
-        self.thirds.clear();
+    /// Takes what is near a cube: patches, each with the step to its own.
+    pub fn gather<'a>(&mut self, near: impl Iterator<Item = (Vec3, &'a Patch)>) {
+        self.near.clear();
         let may_part = |patch: &Patch| patch.points >= LEAST && patch.flatness >= FLAT;
-        self.thirds.extend(near.filter(|(_, patch)| may_part(patch)).map(|(step, &patch)| (step, patch)));
+        self.near.extend(near.filter(|(_, patch)| may_part(patch)).map(|(step, &patch)| (step, patch)));
         self.fours.clear();
-        self.fours.extend(self.thirds.chunks(4).map(|thirds| Four::of(own, thirds)));
+        let four = |near: &[(Vec3, Patch)]| Four::of(first_four(near).each_ref().map(|(step, patch)| (*step, patch)));
+        self.fours.extend(self.near.chunks(4).map(four));
     }
 
-    /// Whether one of them parts the patch from another one, `step` cubes away; `off` as for [`Thirds::may_part`]. The same from
-    /// both ends, to the bit: only what is near both counts.
+    /// Looks at that from a patch of the cube.
+    pub fn look(&mut self, own: &Patch) {
+        self.own.clear();
+        self.own.extend(self.fours.iter().map(|four| Lies::of(own, Vec3::ZERO, four)));
+    }
+
+    /// Whether something of it parts the patch that looked from another one, `step` cubes away; `off` as for [`Thirds::may_part`].
+    /// The same from both ends, to the bit: only what is near both counts, and neither parts itself.
     pub fn part(&self, other: &Patch, step: Vec3, off: f32) -> bool {
-        self.fours.iter().any(|four| four.part(other, step, off, self))
-    }
-}
-
-impl Four {
-    fn of(own: &Patch, thirds: &[(Vec3, Patch)]) -> Self {
-        let row = |of: &dyn Fn(&(Vec3, Patch)) -> Vec4| {
-            transposed([0, 1, 2, 3].map(|lane| of(&thirds[lane.min(thirds.len() - 1)])))
-        };
-        let [step_x, step_y, step_z, _] = row(&|(step, _)| step.extend(0.0));
-        let [x, y, z, _] = row(&|(_, patch)| patch.centre.extend(0.0));
-        let [normal_x, normal_y, normal_z, _] = row(&|(_, patch)| patch.normal.extend(0.0));
-        let (step, centre, normal) = ([step_x, step_y, step_z], [x, y, z], [normal_x, normal_y, normal_z]);
-        let place = own.centre.to_array().map(Vec4::splat);
-        let line = [0, 1, 2].map(|axis| (place[axis] - centre[axis]) - step[axis]);
-        Self { step, centre, normal, line, lies: Lies::of(own, line, normal) }
+        self.fours.iter().zip(&self.own).any(|(four, own)| self.one_parts(four, own, other, step, off))
     }
 
-    /// Whether one of the four parts the patch from another one, `step` cubes away.
+    /// Whether one of four does.
     #[inline(always)]
-    fn part(&self, other: &Patch, step: Vec3, off: f32, limits: &Thirds) -> bool {
-        let [step, place] = [step, other.centre].map(|vector| vector.to_array().map(Vec4::splat));
-        let away = [0, 1, 2].map(|axis| step[axis] - self.step[axis]);
-        let [near_x, near_y, near_z] = away.map(|away| away.abs().cmple(Vec4::ONE));
+    fn one_parts(&self, four: &Four, own: &Lies, other: &Patch, step: Vec3, off: f32) -> bool {
+        let steps = step.to_array();
+        let [near_x, near_y, near_z] = [0, 1, 2].map(|axis| (steps[axis] - four.step[axis]).abs().cmple(Vec4::ONE));
         let is_near = near_x & near_y & near_z;
         if !is_near.any() {
             return false;
         }
-        let line = [0, 1, 2].map(|axis| (place[axis] - self.centre[axis]) + away[axis]);
-        let lies = Lies::of(other, line, self.normal);
-        (is_near & (self.lie_between(line, &lies, limits.off) | self.lies.are_apart(&lies, off, limits.apart))).any()
-    }
-
-    /// Which of the four lie between the patch and another one.
-    #[inline(always)]
-    fn lie_between(&self, line: [Vec4; 3], other: &Lies, off: f32) -> BVec4A {
-        let is_off = |lies: &Lies| lies.height.abs().cmpgt(Vec4::splat(off));
-        let is_beyond = (self.lies.height * other.height).cmplt(Vec4::ZERO) & is_off(&self.lies) & is_off(other);
-        let through = [0, 1, 2].map(|axis| other.height * self.line[axis] - self.lies.height * line[axis]);
-        let rise = other.height - self.lies.height;
-        is_beyond & dot(through, through).cmplt(WITHIN * (rise * rise))
+        let other = Lies::of(other, step, four);
+        (is_near & (own.are_between(&other, self.off) | own.are_of_one(&other, off, self.apart))).any()
     }
 }
 
 impl Lies {
-    /// `line` are those from the centres of the four to that of the patch.
+    /// Of a patch `step` cubes away from the one that the four are near.
     #[inline(always)]
-    fn of(patch: &Patch, line: [Vec4; 3], normals: [Vec4; 3]) -> Self {
-        let own = patch.normal.to_array().map(Vec4::splat);
-        let (height, depth, alike) = (dot(line, normals), dot(line, own), dot(normals, own));
+    fn of(patch: &Patch, step: Vec3, four: &Four) -> Self {
+        let [place, own, step] = [patch.centre, patch.normal, step].map(|one| one.to_array().map(Vec4::splat));
+        let line = [0, 1, 2].map(|axis| (place[axis] - four.centre[axis]) + (step[axis] - four.step[axis]));
+        let (height, depth, alike) = (dot(line, four.normal), dot(line, own), dot(four.normal, own));
         let square = height * height;
-        Self { height, off: square + depth * depth, beside: dot(line, line) - square, alike: alike * alike }
+        Self { line, height, off: square + depth * depth, beside: dot(line, line) - square, alike: alike * alike }
     }
 
-    /// Which of the four one of two patches goes on in while the other one lies before or behind it; `off` is how far these two are
-    /// off each other's planes.
+    /// Which of the four lie between two patches.
     #[inline(always)]
-    fn are_apart(&self, other: &Self, off: f32, apart: f32) -> BVec4A {
+    fn are_between(&self, other: &Self, off: f32) -> BVec4A {
+        let is_off = |one: &Self| one.height.abs().cmpgt(Vec4::splat(off));
+        let is_beyond = (self.height * other.height).cmplt(Vec4::ZERO) & is_off(self) & is_off(other);
+        let through = [0, 1, 2].map(|axis| other.height * self.line[axis] - self.height * other.line[axis]);
+        let rise = other.height - self.height;
+        is_beyond & dot(through, through).cmplt(WITHIN * (rise * rise))
+    }
+
+    /// Which of the four are of the sheet of one of two patches, while the other one lies before or behind it; `off` is how far these
+    /// two are off each other's planes.
+    #[inline(always)]
+    fn are_of_one(&self, other: &Self, off: f32, apart: f32) -> BVec4A {
         let is_behind = |one: &Self| {
             let is_apart = one.height.abs().cmpgt(Vec4::splat(apart));
             is_apart & one.beside.cmplt(Vec4::splat(BEHIND)) & one.alike.cmpgt(Vec4::splat(PARALLEL))
@@ -192,7 +179,8 @@ mod tests {
             let ((own, place), (other, step)) = (patches[from], patches[to]);
             // Against the cube of the one that looks, and none that is not near it.
             let all = patches.iter().map(|(patch, step)| (step - place, patch));
-            thirds.look(&own, all.filter(|(step, _)| step.abs().max_element() <= 1.0));
+            thirds.gather(all.filter(|(step, _)| step.abs().max_element() <= 1.0));
+            thirds.look(&own);
             let line = (other.centre - own.centre) + (step - place);
             let off = line.dot(own.normal).powi(2) + line.dot(other.normal).powi(2);
             thirds.part(&other, step - place, off)
@@ -239,7 +227,7 @@ mod tests {
         assert!(!are_parted([outer, next(2.7), leaf(next(3.4))]));
     }
 
-    /// Bent as closely as round a rod of two edges' radius: there only those nearly two edges from each other would be.
+    /// Bent as closely as round a rod of two edges' radius: there only those more than 1.6 edges from each other would be.
     #[test]
     fn nothing_parts_a_surface() {
         for bend in [-0.5, -0.2, 0.2, 0.5] {
