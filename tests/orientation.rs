@@ -198,7 +198,7 @@ fn combed(spine: f64, teeth: usize, width: f64) -> Vec<[f64; 2]> {
 }
 
 /// Fins two and a half spacings thick and teeth of four: at their ends a patch lies to the sides of the next one much as it does to
-/// its own. And fins of some five spacings whose far sides are seen askew through them, because with noise they are no longer flat.
+/// its own. And more of them, as thick, with noise: the far side of each is seen askew through it.
 #[test]
 fn fins_and_teeth_face_outwards() {
     let heat_sink = combed(0.2, 13, 0.025).into_iter().map(|[x, y]| [x, 0.4 * y]).collect();
@@ -214,7 +214,7 @@ fn fins_and_teeth_face_outwards() {
     }
 }
 
-/// The sides of a hollow ball, of walls four spacings thick, with a round opening whose rim is next to nothing of it.
+/// The sides of a hollow ball, of walls three and a half spacings thick, with a round opening whose rim is next to nothing of it.
 #[test]
 fn the_inside_of_a_hollow_body_faces_its_hollow() {
     let mut random = Random(45);

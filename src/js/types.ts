@@ -43,14 +43,14 @@ export interface EstimateOptions {
    */
   k?: number;
   /**
-   * How signs are chosen. Default `'none'`: `x + 2y + 4z >= 0`, deterministic and nothing more. `'consistent'`: one sign for
-   * each connected surface, outwards if it is closed, else towards what stands before it; if nothing does, as what it
-   * touches, or away from its middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal; what one scanner saw from one
-   * place faces it. `'outward'`: the same, but never to what stands before it, nor to a scanner: for objects, also with
+   * How signs are chosen. Default `'none'`: `x + 2y + 4z >= 0`, deterministic and nothing more. `'consistent'`: one sign
+   * for each connected surface, outwards if it is closed, else towards what stands before it; if nothing does, as what it
+   * touches, or away from its middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal; what one scanner saw from
+   * one place faces it. `'outward'`: the same, but never to what stands before it, nor to a scanner: for objects, also with
    * holes. Both also average normals, with `cell: 'auto'`, where surfaces face apart within the noise, as at edges and on
    * rods, and give the narrow sides of ribs and grooves without noise the planes that their points lie on: elsewhere only
-   * signs change. `viewpoint`: towards a position, in the coordinates of `positions`. `up`: towards a direction of any length
-   * but 0, for terrain. Both are arrays of three finite numbers.
+   * signs change. `viewpoint`: towards a position, in the coordinates of `positions`. `up`: towards a direction of any
+   * length but 0, for terrain. Both are arrays of three finite numbers.
    */
   orient?:
     'none' | 'consistent' | 'outward' | { viewpoint: [number, number, number] } | { up: [number, number, number] };
@@ -123,15 +123,15 @@ export interface Report {
   /**
    * The surfaces that were given one sign each: how many there are, and at most the thousand largest, the largest first.
    * `side` tells by what: `'air'`, because the surface is closed, and one side sees much more of the open air; `'volume'`,
-   * away from the middle of what is open or hidden, or, of what is long and thin, from the middles of its pieces; `'touch'`,
-   * as a surface that it touches and that the air told, or that was told so; `'sight'`, because other surfaces, or its own parts, stand before
-   * that side; `'view'`, because the cloud is what a scanner saw from that side or from amid the surfaces (both by
-   * `'consistent'` only); `'convention'`, because it is open and flat, so that nothing tells: the mean normal has `x + 2y +
-   * 4z >= 0`, where all was seen from one side that of all surfaces. `confidence`, from 0, a guess, to 1, which is sure: of
-   * all that is seen of the open, how much more is seen from one side; for what sees nothing of it how much volume there is,
-   * of that of a sphere, or of its pieces; by touch, half of how much more evidence speaks for that side, of all and of what is needed; by sight,
-   * half of how much more looks at that side, of all that does; by view, up to a half, or from amid the surfaces how well
-   * their densities tell where it was.
+   * away from the middle of what is open or hidden, or, of what is long and thin, from the middles of its pieces;
+   * `'touch'`, as a surface that it touches and that the air told, or that was told so; `'sight'`, because other surfaces,
+   * or its own parts, stand before that side; `'view'`, because the cloud is what a scanner saw from that side or from amid
+   * the surfaces (both by `'consistent'` only); `'convention'`, because it is open and flat, so that nothing tells: the
+   * mean normal has `x + 2y + 4z >= 0`, where all was seen from one side that of all surfaces. `confidence`, from 0, a
+   * guess, to 1, which is sure: of all that is seen of the open, how much more is seen from one side; for what sees nothing
+   * of it how much volume there is, of that of a sphere, or of its pieces; by touch, half of how much more evidence speaks
+   * for that side, of all and of what is needed; by sight, half of how much more looks at that side, of all that does; by
+   * view, up to a half, or from amid the surfaces how well their densities tell where it was.
    * Only with `orient: 'consistent'` and `'outward'`.
    */
   components?: {
