@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::lattice::{Lattice, mixed};
 use crate::lists::reserve;
+use crate::order::sort_once;
 use crate::parallel::{self, Filling, Gathering};
 use crate::points::CHUNK;
 use crate::progress::Stage;
@@ -147,18 +148,17 @@ impl Bricks {
             let mut places = Vec::new();
             for (lattice, points) in source.parts(parallel::piece(source.len(), CHUNK, i)) {
                 for brick in source.positions[points].iter().filter_map(|&position| lattice.brick_place(position)) {
-                    // Of this width, so that there is one sort of such triples in the module.
                     let place = [brick.z, brick.y, brick.x].map(i64::from);
                     if places.last() != Some(&place) {
                         places.push(place);
                     }
                 }
             }
-            sort(&mut places);
+            sort_once(&mut places);
             found.append(places);
         })?;
         let mut found = found.all()?;
-        sort(&mut found);
+        sort_once(&mut found);
         let mut places = Vec::new();
         reserve(&mut places, found.len(), "the grid")?;
         places.extend(found.into_iter().map(|[z, y, x]| IVec3::new(x as i32, y as i32, z as i32)));
@@ -243,11 +243,6 @@ pub(crate) fn set_bits(mut bits: u64) -> impl Iterator<Item = u32> {
 /// How many bricks come before a slot.
 fn rank(bits: &[u64], before: &[u32], slot: usize) -> u32 {
     before[slot / 64] + (bits[slot / 64] & ((1 << (slot % 64)) - 1)).count_ones()
-}
-
-fn sort(places: &mut Vec<[i64; 3]>) {
-    places.sort_unstable();
-    places.dedup();
 }
 
 fn hash(brick: IVec3) -> usize {

@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::lattice::mixed;
 use crate::message::message;
 use crate::number;
-use crate::order::{from_ordinal, ordinal, sort};
+use crate::order::{from_ordinal, ordinal, sort, sort_once};
 use crate::parallel::{self, Gathering};
 use crate::points::{Bounds, Bulk, Points};
 use crate::power::{exp2, log2};
@@ -163,10 +163,8 @@ impl Probes {
     /// Halves the edge until the probes hold no more of the cloud than wanted.
     #[optimize(size)]
     fn place(bulk: &Bulk, extent: f64, count: usize) -> Self {
-        // As whole numbers, so that there is one sort of such triples in the module.
         let mut sorted: Vec<[i64; 3]> = bulk.sample.iter().map(|p| p.to_array().map(ordinal)).collect();
-        sorted.sort_unstable();
-        sorted.dedup();
+        sort_once(&mut sorted);
         let sample: Vec<DVec3> = sorted.into_iter().map(|p| DVec3::from_array(p.map(from_ordinal))).collect();
         let wanted = (PROBED_POINTS / count as f64).max(1.0 / 64.0);
         let step = sample.len().div_ceil(PROBES).max(1);

@@ -40,6 +40,13 @@ pub(crate) fn sort(numbers: &mut Vec<i64>) {
     }
 }
 
+/// Sorts triples, each of which stays once. In place; whole numbers of this width for all, so that there is one such sort.
+#[inline(never)]
+pub(crate) fn sort_once(triples: &mut Vec<[i64; 3]>) {
+    triples.sort_unstable();
+    triples.dedup();
+}
+
 /// Sorts a list without NaN by insertion, and of short ones nothing is faster; if it is longer, after each has a rough place by its
 /// `height`, which must be in the same order: among that of all, as if they were evenly spread.
 pub(crate) fn sort_few<T: Copy + PartialOrd>(list: &mut [T], height: impl Fn(T) -> f32) {

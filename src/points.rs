@@ -222,9 +222,10 @@ impl Bulk {
             let mut values: Vec<i64> = bulk.sample.iter().map(|p| ordinal(p[axis])).collect();
             sort(&mut values);
             let quantile = |q: f64| from_ordinal(values[((values.len() - 1) as f64 * q + 0.5) as usize]);
-            bulk.median[axis] = quantile(0.5);
-            bulk.extent = bulk.extent.max(quantile(0.95) - quantile(0.05));
-            bulk.core = bulk.core.max(quantile(0.75) - quantile(0.25));
+            let [first, low, median, high, last] = [0.05, 0.25, 0.5, 0.75, 0.95].map(quantile);
+            bulk.median[axis] = median;
+            bulk.extent = bulk.extent.max(last - first);
+            bulk.core = bulk.core.max(high - low);
         }
         bulk
     }

@@ -401,10 +401,11 @@ fn quote(bytes: &[u8], most: usize) -> String {
 }
 
 /// Text of a file: UTF-8, or else Latin-1, which takes any bytes.
+#[optimize(size)]
 #[inline(never)]
 pub(super) fn decode(bytes: &[u8]) -> String {
-    match str::from_utf8(bytes) {
-        Ok(text) => text.to_owned(),
-        Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
+    match bytes.utf8_chunks().next() {
+        Some(first) if first.valid().len() == bytes.len() => first.valid().to_owned(),
+        _ => bytes.iter().map(|byte| char::from(*byte)).collect(),
     }
 }

@@ -12,6 +12,7 @@ pub(super) fn wave() -> usize {
 
 /// Runs `work` for each number below `count`, in parallel, with progress. The error is that of the first task that
 /// fails, in the order of the numbers.
+#[optimize(size)]
 pub(super) fn run(
     stage: &Stage,
     count: usize,
