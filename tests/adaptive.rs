@@ -279,6 +279,26 @@ fn cables_are_no_noise() {
     assert!(error < 4.1, "{error} degrees");
 }
 
+/// Forty bars side by side, four point spacings wide, six high and four apart, clean and with noise of a third of a spacing.
+#[test]
+fn bars_are_no_noise() {
+    for (noise, bound) in [(0.0, 23.0), (0.33, 33.0)] {
+        let mut random = Random(28);
+        let bars = Cloud::of((0..100_000).map(|i| {
+            let [along, u, v] = [random.unit(), random.signed(), random.signed()];
+            let end = if random.bits() & 1 == 0 { 1.0 } else { -1.0 };
+            // Of 20 spacings round a bar 8 are above and below.
+            let (out, up, normal) =
+                if random.unit() < 0.4 { (u, end, [0.0, 0.0, end]) } else { (end, v, [0.0, end, 0.0]) };
+            let place = [125.0 * along, 8.0 * f64::from(i % 40) + 2.0 * out, 3.0 * up];
+            (turn(place.map(|c| c + noise * random.gauss())), turn(normal))
+        }));
+        let error = root_mean_square(&errors(&bars).0);
+        println!("bars with noise of {noise}: {error} degrees");
+        assert!(error < bound, "bars with noise of {noise}: {error} degrees");
+    }
+}
+
 /// A board four point spacings thick, on its own a plane with noise to all but the smallest neighbourhoods: its rim is none.
 #[test]
 fn thin_boards_have_rims() {

@@ -219,11 +219,12 @@ impl Faces {
         let total = 4.0 * (self.places.len() / 4).div_ceil(stride) as f32;
         let (mut squares, mut count) = (0.0, 0.0);
         for number in 0..self.all.len() {
-            let [points, sums @ .., square] = sums[number].map(|sum| f64::from(sum.element_sum()));
+            let sums = sums[number].map(|sum| f64::from(sum.element_sum()));
+            let [points, .., square] = sums;
             if (points as f32) < (LEAST * total).max(10.0) {
                 return false;
             }
-            let Some((mean, normal, covariance)) = plane_of(points, sums) else { return false };
+            let Some((mean, normal, covariance)) = plane_of(&sums) else { return false };
             let (mut normal, centre) = (normal.as_vec3(), mean.as_vec3());
             if number > 0 {
                 // As on an arc from the first one.

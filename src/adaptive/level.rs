@@ -251,17 +251,21 @@ impl Level {
         let surfaces = Filling::new(self.grid.cubes(), WHAT)?;
         stage.run(grid.blocks.len(), &|block| {
             let (mut around, mut window) = (Around::new(), Window::new());
+            let samples = |cube: usize| &self.samples[range(&self.sample_end, cube)];
             for (brick, cube, bit) in grid.cubes_in(block) {
                 window.clear();
                 if self.role(cube) != Role::Settled {
                     for &Near { step, cube } in around.near(grid, brick, bit, 1) {
                         let shares = 1.0 - (1.0 - NEXT) * step.abs();
-                        let samples = &self.samples[range(&self.sample_end, cube as usize)];
-                        window.add(samples, step, shares.element_product());
+                        window.add(samples(cube as usize), step, shares.element_product());
                     }
                 }
+                let mut surface = window.fit();
+                if surface.may_hide_parts() {
+                    surface.is_folded = window.stand_across(&surface, samples(cube)[0].place);
+                }
                 // SAFETY: once for each cube.
-                unsafe { surfaces.write(cube, window.fit()) };
+                unsafe { surfaces.write(cube, surface) };
             }
         })?;
         // SAFETY: these were all cubes.

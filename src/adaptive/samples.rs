@@ -101,8 +101,22 @@ impl Window {
         self.count += samples.len();
     }
 
+    /// Leaves those no farther from a place than so much, squared.
+    #[inline(always)]
+    pub fn keep_near(&mut self, place: Vec3, square: f32) {
+        let mut count = 0;
+        for i in 0..self.count {
+            let [x, y, z] = [0, 1, 2].map(|axis| self.numbers[axis][i]);
+            if Vec3::new(x, y, z).distance_squared(place) <= square {
+                self.numbers.iter_mut().for_each(|numbers| numbers[count] = numbers[i]);
+                count += 1;
+            }
+        }
+        self.count = count;
+    }
+
     /// Lets what the lanes beyond the last sample hold weigh nothing.
-    pub fn pad(&mut self) {
+    fn pad(&mut self) {
         for number in [POINTS, WEIGHT] {
             self.numbers[number][self.count..self.count.next_multiple_of(4)].fill(0.0);
         }
@@ -125,16 +139,17 @@ impl Window {
         self.sum_lanes(|i| terms(self.lanes(i)))
     }
 
-    /// How many points there are, and the sums over these, each with its sample's weight, of 1, x, y, z, xx, yy, zz, yz,
-    /// xz and xy.
-    pub fn moments(&self) -> [f64; 11] {
+    /// The sums over all points, each with its sample's weight, of 1, x, y, z, xx, yy, zz, yz, xz and xy; and how many points
+    /// there are.
+    pub fn moments(&mut self) -> [f64; 11] {
+        self.pad();
         self.sum_lanes(|i| {
             let [x, y, z, w] = self.lanes(i);
             let (wx, wy, wz) = (w * x, w * y, w * z);
             let [xx, yy, zz, yz, xz, xy] = [4, 5, 6, 7, 8, 9].map(|number| w * self.four(number, i));
             let squares = [wx * x + xx, wy * y + yy, wz * z + zz, wy * z + yz, wx * z + xz, wx * y + xy];
             let [xx, yy, zz, yz, xz, xy] = squares;
-            [self.four(POINTS, i), w, wx, wy, wz, xx, yy, zz, yz, xz, xy]
+            [w, wx, wy, wz, xx, yy, zz, yz, xz, xy, self.four(POINTS, i)]
         })
     }
 

@@ -60,6 +60,8 @@ pub(super) struct Surface {
     /// Whether it is a plane in noise so wide that the parts of its cube, with a quarter of the points on half the width, would
     /// know less.
     pub is_plane_in_noise: bool,
+    /// Whether what passes for noise may be folds: points next to each other lie on a plane that stands across it.
+    pub is_folded: bool,
 }
 
 impl Surface {
@@ -75,6 +77,7 @@ impl Surface {
         is_curved: false,
         lacks_detail: false,
         is_plane_in_noise: false,
+        is_folded: false,
     };
 
     /// Variance of the angle of its normal at a place.
@@ -85,6 +88,11 @@ impl Surface {
     /// Whether so much is left inside of its samples as there would be of noise of this variance.
     pub fn shows(&self, noise: f32) -> bool {
         self.within >= WITHIN * noise / (1.0 + SAMPLE as f32 * noise)
+    }
+
+    /// Whether there may be so much noise that it decides whether the cube is divided.
+    pub fn may_hide_parts(&self) -> bool {
+        self.is_plane_in_noise || self.is_curved && self.noise >= HIDING
     }
 
     /// Whether there is one.
@@ -106,6 +114,9 @@ const WITHIN: f32 = 0.85;
 /// Parts of a cube know less than it where noise has so much variance, in square edges: a deviation of 0.11.
 const DEEP: f64 = 0.012;
 
+/// Parts of cubes that were divided before know less than these where noise has so much variance, in square edges.
+pub(super) const HIDING: f32 = 0.1;
+
 /// A surface that bends less in an edge, in radians and squared, may be a plane.
 const PLANE: f64 = 0.004;
 
@@ -120,6 +131,15 @@ const WIDE: f64 = 10.0;
 
 /// The share of what is inside of samples that is left of noise when each may slope: all, but for chance.
 const LEFT: f64 = 0.9;
+
+/// What lies no farther from a sample than so many edges, squared, is next to it; the second where samples are of several points,
+/// which have more of them there.
+const BESIDE: f32 = 1.0;
+const BESIDE_OF_MANY: f32 = 0.5;
+
+/// Of a fold the points next to one are so many at the least, and lie on a plane: no thicker than this share of its width, squared.
+const FOLD_POINTS: f64 = 8.0;
+const FOLD: f64 = 0.25;
 
 /// With fewer samples a surface is taken for a plane.
 const QUADRIC_SAMPLES: f64 = 10.0;
@@ -142,19 +162,20 @@ impl Window {
     /// The surface that fits the samples best: the plane of the principal components, then by least squares the height
     /// over it as a quadratic function.
     pub fn fit(&mut self) -> Surface {
-        self.pad();
         let moments = self.moments();
-        if moments[0] < 3.0 {
+        let points = moments[10];
+        if points < 3.0 {
             return Surface::NONE;
         }
         // Along a line: how many they are, because the halves may tell more.
-        self.through(moments).unwrap_or(Surface { points: moments[0] as f32, ..Surface::NONE })
+        self.through(&moments).unwrap_or(Surface { points: points as f32, ..Surface::NONE })
     }
 
     /// The same, if the samples do not lie along a line, from their [`Window::moments`].
     #[inline(always)]
-    fn through(&self, [points, total, x, y, z, xx, yy, zz, yz, xz, xy]: [f64; 11]) -> Option<Surface> {
-        let (mean, normal, covariance) = plane_of(total, [x, y, z, xx, yy, zz, yz, xz, xy])?;
+    fn through(&self, moments: &[f64; 11]) -> Option<Surface> {
+        let (mean, normal, covariance) = plane_of(moments)?;
+        let (total, points) = (moments[0], moments[10]);
         let (u, v, [along, across, thick]) = principal(&covariance, normal);
         let (mean, normal) = (mean.as_vec3(), normal.as_vec3());
         let count = self.len() as f64;
@@ -222,6 +243,20 @@ impl Window {
             surface.lacks_detail = points > count;
         }
         Some(surface)
+    }
+
+    /// Whether the samples next to a place lie on a plane across the surface that was fitted to all. The others are given up.
+    #[optimize(size)]
+    #[inline(never)]
+    pub fn stand_across(&mut self, Surface { quadric, points, .. }: &Surface, place: Vec3) -> bool {
+        let is_of_many = *points > 2.0 * self.len() as f32;
+        self.keep_near(place, if is_of_many { BESIDE_OF_MANY } else { BESIDE });
+        let moments = self.moments();
+        let plane = plane_of(&moments).filter(|_| moments[10] >= FOLD_POINTS);
+        plane.is_some_and(|(_, _, covariance)| {
+            let (_, _, [_, across, high]) = principal(&covariance, quadric.slope.as_dvec3());
+            across < FOLD * high
+        })
     }
 
     /// Least squares of the height over the plane of `frame`, as a function 1, u, v, uu, uv, vv.
@@ -363,10 +398,10 @@ fn inverse([a, b, c]: [DVec3; 3]) -> Option<[DVec3; 3]> {
     (a.x > 0.0 && z.z > 0.0 && determinant > 0.0).then(|| [x, y, z].map(|column| column / determinant))
 }
 
-/// The mean of some points, their normal and their covariance, from the sum of their weights and the sums over all of x, y, z,
-/// xx, yy, zz, yz, xz and xy; unless they lie along a line.
+/// The mean of some points, their normal and their covariance, from the sums of their weights and over all of x, y, z, xx, yy,
+/// zz, yz, xz and xy, and one more that does not matter; unless they lie along a line.
 #[inline(never)]
-pub(super) fn plane_of(total: f64, [x, y, z, xx, yy, zz, yz, xz, xy]: [f64; 9]) -> Option<(DVec3, DVec3, Symmetric)> {
+pub(super) fn plane_of(&[total, x, y, z, xx, yy, zz, yz, xz, xy, _]: &[f64; 11]) -> Option<(DVec3, DVec3, Symmetric)> {
     let share = 1.0 / total;
     let mean = DVec3::new(x, y, z) * share;
     let diagonal = DVec3::new(xx, yy, zz) * share - mean * mean;

@@ -7,7 +7,7 @@ use super::facets::{Facets, TORN};
 use super::level::{Level, Role};
 use super::matrix::times_lanes;
 use super::sheets::Sheets;
-use super::surface::Surface;
+use super::surface::{HIDING, Surface};
 use super::tally::Tally;
 use super::{DIVISIONS, WHAT};
 use crate::error::Error;
@@ -66,8 +66,8 @@ const UNSURE: f32 = 0.07;
 /// A cube is in noise where one in so many cubes near it is a plane in noise.
 const IN_NOISE: usize = 10;
 
-/// Parts of cubes that were divided before know less than these where noise has so much variance, in square edges.
-const WIDE: f32 = 0.1;
+/// Where more than one in so many cubes near one is folded it is not in noise.
+const FOLDED: usize = 20;
 
 /// Where a sheet goes on, so many cubes within two are occupied; small objects have fewer.
 const SHEET: usize = 25;
@@ -203,11 +203,12 @@ impl<'a> Task<'a> {
             if !is_edge {
                 let noise = LazyCell::new(|| quartile(near.iter().map(|near| chosen[near.cube as usize].flat_noise)));
                 if can_divide {
-                    let (mut planes, mut showing) = (0, 0);
+                    let (mut planes, mut showing, mut folded) = (0, 0, 0);
                     for near in near {
                         let surface = &level.surfaces[near.cube as usize];
                         planes += usize::from(surface.is_plane_in_noise);
                         showing += usize::from(surface.is_some() && surface.shows(surface.noise));
+                        folded += usize::from(surface.is_folded);
                     }
                     // Noise hides what the parts could tell, also of an edge in this very cube: there is a plane in noise, or it
                     // is as wide as the parts, and most surfaces show it within their samples.
@@ -215,9 +216,9 @@ impl<'a> Task<'a> {
                         division > 0
                             && near.len() >= SHEET
                             && 2 * showing >= near.len()
-                            && (WIDE..f32::INFINITY).contains(&*noise)
+                            && (HIDING..f32::INFINITY).contains(&*noise)
                     };
-                    if IN_NOISE * planes < near.len() && !is_wide() {
+                    if FOLDED * folded > near.len() || IN_NOISE * planes < near.len() && !is_wide() {
                         return Role::Wanted;
                     }
                 }
