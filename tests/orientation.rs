@@ -243,6 +243,26 @@ fn the_inside_of_a_hollow_body_faces_its_hollow() {
     }
 }
 
+/// Hardly anything but their thickness tells the inside of these from their outside: walls three and a half spacings thick, of a
+/// ball without an opening, and fins two and a half spacings thick and as far apart.
+#[test]
+fn the_sides_of_walls_face_apart() {
+    let mut random = Random(46);
+    let shell = Cloud::of((0..60_000).map(|_| {
+        let direction = random.direction();
+        let (radius, side) = if random.unit() < 0.5 { (1.0, 1.0) } else { (0.93, -1.0) };
+        (direction.map(|c| radius * c), direction.map(|c| side * c))
+    }));
+    let fins = prism(100_000, 47, &combed(0.1, 13, 0.04), 1.0);
+    for (name, cloud, least) in [("a shell", shell, 1.0), ("fins", fins, 0.999)] {
+        for how in [Orient::Consistent, Orient::Outward] {
+            let right = share_right(&orient(&cloud.points, how).normals, &cloud.normals);
+            println!("{name}, {how:?}: {right}");
+            assert!(right >= least, "{name}, {how:?}: {right}");
+        }
+    }
+}
+
 /// The cubes are wider than the tube, so that each sees the open with both sides, and the volume is next to none of that of a
 /// sphere as long.
 #[test]

@@ -70,6 +70,13 @@ impl Groups {
         Ok(Self { levels, own, component })
     }
 
+    /// Those with more links, told from one of their ends each.
+    pub fn with(self, told: &[(u32, Link)], sights: &Sights, patches: &Patches, stage: &Stage) -> Result<Self, Error> {
+        let mut links = self.into_links().unwrap_or_default();
+        links.add(told)?;
+        Self::of(links, sights, patches, stage)
+    }
+
     /// The links between patches, if there are any.
     pub fn into_links(self) -> Option<Links> {
         self.levels.into_iter().next().map(|level| level.links)

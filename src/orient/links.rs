@@ -3,11 +3,12 @@
 use super::fours::{Four, first_four};
 use super::parted::Thirds;
 use super::patches::{MOST, Patch, Patches};
+use super::walls::across;
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
 use crate::lanes::{dot, power, root};
-use crate::lists::{filled, fitted, grow, reserve, starts};
+use crate::lists::{concatenated, filled, fitted, grow, reserve, starts};
 use crate::parallel::Filling;
 use crate::progress::Stage;
 use crate::surroundings::{NEAR, Places, STEPS, Surroundings};
@@ -67,15 +68,15 @@ const LEAST: f32 = 0.01;
 const LIST: usize = 1 << 14;
 
 impl Links {
-    /// Links every patch to those in its cube and the 26 round it; `noise` is that of the points, in edges. One pass over the
-    /// patches.
-    pub fn of(grid: &Grid, patches: &Patches, noise: f32, stage: &Stage) -> Result<Self, Error> {
+    /// Links every patch to those in its cube and the 26 round it; `noise` is that of the points, in edges. Apart from these what
+    /// the two sides of walls and gaps say, from one of its ends. One pass over the patches.
+    pub fn of(grid: &Grid, patches: &Patches, noise: f32, stage: &Stage) -> Result<(Self, Vec<(u32, Link)>), Error> {
         let (squarings, is_clean) = (squarings(noise), noise < CLEAN);
         let runs = Filling::new(patches.all.len(), GRAPH)?;
-        let lists = stage.collect(grid.blocks.len(), GRAPH, &|block| {
+        let found = stage.collect(grid.blocks.len(), GRAPH, &|block| {
             let mut surroundings = Surroundings::new();
             let (mut near, mut fours, mut links) = (Vec::new(), Vec::new(), Vec::new());
-            let (mut told, mut shares) = (Vec::new(), Vec::new());
+            let (mut told, mut shares, mut walls) = (Vec::new(), Vec::new(), Vec::new());
             let mut thirds = Thirds::new(noise, GRAPH)?;
             grow(&mut near, STEPS.len() * MOST, GRAPH)?;
             grow(&mut fours, STEPS.len() * MOST / 4, GRAPH)?;
@@ -125,11 +126,20 @@ impl Links {
                         let evidence = (told.evidence * (share[0] * share[1])).to_array();
                         let (may_part, off) = (thirds.may_part(told.off), told.off.to_array());
                         for (lane, &(to, place)) in near.iter().enumerate() {
-                            if says >> lane & 1 == 0 || to == own {
+                            let (says, may_be_parted) = (says >> lane & 1 == 1, may_part >> lane & 1 == 1);
+                            if to == own || !says && !may_be_parted {
                                 continue;
                             }
-                            if may_part >> lane & 1 == 0 || !thirds.part(&patches.all[to], step(place), off[lane]) {
+                            let (other, step) = (&patches.all[to], step(place));
+                            if says && !(may_be_parted && thirds.part(other, step, off[lane])) {
                                 links.push(Link { to: to as u32, evidence: evidence[lane] });
+                            }
+                            if may_be_parted
+                                && own < to
+                                && let Some(evidence) = across(&patches.all[own], other, step, &thirds)
+                            {
+                                grow(&mut walls, 1, GRAPH)?;
+                                walls.push((own as u32, Link { to: to as u32, evidence }));
                             }
                         }
                     }
@@ -137,10 +147,30 @@ impl Links {
                     unsafe { runs.write(own, Run { list: block, start, end: links.len() }) };
                 }
             }
-            fitted(&links, GRAPH)
+            Ok((fitted(&links, GRAPH)?, walls))
         })?;
+        let (lists, walls) = found.into_iter().unzip();
         // SAFETY: the blocks hold all cubes, and these all patches.
-        Ok(Self { runs: unsafe { runs.complete() }, lists })
+        Ok((Self { runs: unsafe { runs.complete() }, lists }, concatenated(walls, GRAPH)?))
+    }
+
+    /// Takes in more, that are told from one of their ends each.
+    pub fn add(&mut self, told: &[(u32, Link)]) -> Result<(), Error> {
+        let more = Self::both_ways(self.len(), told.iter().copied())?;
+        for one in (0..more.len()).filter(|&one| !more.from(one).is_empty()) {
+            let Run { list, start, end } = self.runs[one];
+            let more = more.from(one);
+            // What it had is of no use any more where it was.
+            let had = std::mem::take(&mut self.lists[list]);
+            let added = self.push(end - start + more.len(), |longer| {
+                longer.extend_from_slice(&had[start..end]);
+                longer.extend_from_slice(more);
+            });
+            self.lists[list] = had;
+            added?;
+            self.runs.swap_remove(one);
+        }
+        Ok(())
     }
 
     /// Of so many patches, from links that are told from one of their ends each.

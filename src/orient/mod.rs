@@ -1,8 +1,9 @@
 //! The signs of normals, whichever method found them.
 //!
 //! `docs/orientation.md` explains the rule, its sources and its limits. In short: the points of each small cube are parted
-//! into patches ([`patches`]), a patch and those round it say whether their signs agree ([`links`]), which sides of a patch
-//! are open to the air says which way is out ([`air`]), and the signs are chosen that these agree with best ([`groups`]), of
+//! into patches ([`patches`]), a patch and those round it say whether their signs agree ([`links`]), and so do the two sides of a
+//! wall ([`walls`]), which sides of a patch are open to the air says which way is out ([`air`]), and the signs are chosen that
+//! these agree with best ([`groups`]), of
 //! open surfaces also what their parts see of each other ([`looks`]). These then face what stands before them ([`facing`]), or the
 //! scanner, if one saw all: where it stood, if densities tell that ([`station`]), or the direction from which it did ([`view`]).
 //! Of a few points that are no surface, what is round them tells the side ([`specks`]). In noise normals then become means of
@@ -31,6 +32,7 @@ mod station;
 mod support;
 mod thinning;
 mod view;
+mod walls;
 
 pub use components::{Component, Components, Side};
 
@@ -48,7 +50,7 @@ use components::decide;
 use cubes::Cubes;
 use glam::{DVec3, Vec3};
 use groups::Groups;
-use links::Links;
+use links::{Link, Links};
 use looks::Looks;
 use patches::{Members, Patches};
 use signs::{Choice, Signs};
@@ -132,12 +134,12 @@ fn surfaces(
     grid.placed = Vec::new();
     let ball = Ball::of(grid);
     let sights = air::sights(&ball, grid, &patches, points.len(), &stage.part(0.5..0.55))?;
-    let links = Links::of(grid, &patches, *noise, &stage.part(0.55..0.7))?;
+    let (links, walls) = Links::of(grid, &patches, *noise, &stage.part(0.55..0.7))?;
     let groups = Groups::of(links, &sights, &patches, &stage.part(0.7..0.85))?;
     let choosing = stage.part(0.85..0.9);
     let (choice, looks, scanner) = match options.orient {
-        Orient::Outward => (outward(groups, &patches, &sights, &choosing)?, None, None),
-        _ => consistent(groups, &ball, grid, &patches, *noise, &sights, &choosing)?,
+        Orient::Outward => (outward(groups, walls, &patches, &sights, &choosing)?, None, None),
+        _ => consistent((groups, walls), &ball, grid, &patches, *noise, &sights, &choosing)?,
     };
     let (mut signs, links) = choice.into_signs();
     let mut decisions = decide(grid, &patches, &sights, links.as_ref(), &mut signs)?;
@@ -173,8 +175,14 @@ enum Scanner {
 }
 
 /// Signs that count all of the open, but of what is not closed a share: much of that sees the open with its inside.
-fn outward(groups: Groups, patches: &Patches, sights: &Sights, stage: &Stage) -> Result<Choice, Error> {
-    let mut choice = Choice::of(groups, patches, sights, &stage.part(0.0..0.6))?;
+fn outward(
+    groups: Groups,
+    walls: Vec<(u32, Link)>,
+    patches: &Patches,
+    sights: &Sights,
+    stage: &Stage,
+) -> Result<Choice, Error> {
+    let mut choice = Choice::of(groups, walls, patches, sights, &stage.part(0.0..0.6))?;
     if choice.is_any_open() {
         choice.be_cautious(None, sights, &stage.part(0.6..1.0))?;
     }
@@ -185,7 +193,7 @@ fn outward(groups: Groups, patches: &Patches, sights: &Sights, stage: &Stage) ->
 /// each other; but not where all was seen from one place, because that is open all over behind, and the hollow side of it looks
 /// at itself. Also these looks, if there is anything that is not closed, and the scanner, if there was one.
 fn consistent(
-    groups: Groups,
+    (groups, walls): (Groups, Vec<(u32, Link)>),
     ball: &Ball,
     grid: &Grid,
     patches: &Patches,
@@ -193,7 +201,7 @@ fn consistent(
     sights: &Sights,
     stage: &Stage,
 ) -> Result<(Choice, Option<Looks>, Option<Scanner>), Error> {
-    let mut choice = Choice::of(groups, patches, sights, &stage.part(0.0..0.3))?;
+    let mut choice = Choice::of(groups, walls, patches, sights, &stage.part(0.0..0.3))?;
     let mut looks = None;
     if choice.is_any_open() {
         looks = Some(Looks::from_the_open(grid, patches, sights)?);

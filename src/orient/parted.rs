@@ -48,6 +48,8 @@ const FLAT: f32 = 0.8;
 
 /// What is near a cube, and may part patches of that from others.
 pub(super) struct Thirds {
+    /// That of the points, in edges.
+    pub noise: f32,
     /// How far two are at least off the plane of one that lies between them.
     off: f32,
     /// How far one is at least off the plane of one before or behind it.
@@ -81,7 +83,7 @@ impl Thirds {
         grow(&mut near, STEPS.len() * MOST, what)?;
         grow(&mut fours, STEPS.len() * MOST / 4, what)?;
         grow(&mut own, STEPS.len() * MOST / 4, what)?;
-        Ok(Self { off: OFF.max(DEVIATIONS * noise), apart: OFF.max(LAYERS * noise), near, fours, own })
+        Ok(Self { noise, off: OFF.max(DEVIATIONS * noise), apart: OFF.max(LAYERS * noise), near, fours, own })
     }
 
     /// A bit for each of four pairs that something may part; `off` are the sums of the squares of how far the two are off each
@@ -112,18 +114,32 @@ impl Thirds {
         self.fours.iter().zip(&self.own).any(|(four, own)| self.one_parts(four, own, other, step, off))
     }
 
+    /// Whether something of it lies between the patch that looked and another one, `step` cubes away; from both ends as above.
+    pub fn lie_between(&self, other: &Patch, step: Vec3) -> bool {
+        self.fours.iter().zip(&self.own).any(|(four, own)| {
+            let is_near = is_near(four, step);
+            is_near.any() && (is_near & own.are_between(&Lies::of(other, step, four), self.off)).any()
+        })
+    }
+
     /// Whether one of four does.
     #[inline(always)]
     fn one_parts(&self, four: &Four, own: &Lies, other: &Patch, step: Vec3, off: f32) -> bool {
-        let steps = step.to_array();
-        let [near_x, near_y, near_z] = [0, 1, 2].map(|axis| (steps[axis] - four.step[axis]).abs().cmple(Vec4::ONE));
-        let is_near = near_x & near_y & near_z;
+        let is_near = is_near(four, step);
         if !is_near.any() {
             return false;
         }
         let other = Lies::of(other, step, four);
         (is_near & (own.are_between(&other, self.off) | own.are_of_one(&other, off, self.apart))).any()
     }
+}
+
+/// Which of four are in the cube so many cubes away, or next to it.
+#[inline(always)]
+fn is_near(four: &Four, step: Vec3) -> BVec4A {
+    let steps = step.to_array();
+    let [x, y, z] = [0, 1, 2].map(|axis| (steps[axis] - four.step[axis]).abs().cmple(Vec4::ONE));
+    x & y & z
 }
 
 impl Lies {

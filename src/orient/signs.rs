@@ -3,7 +3,7 @@
 use super::air::Sights;
 use super::ball::STRAYS;
 use super::groups::Groups;
-use super::links::Links;
+use super::links::{Link, Links};
 use super::looks::Looks;
 use super::patches::{Patches, signed};
 use crate::error::Error;
@@ -26,6 +26,13 @@ pub(super) struct Signs {
 /// scan with trees, its patches turned to what they see, 0.54.
 pub(super) const CLOSED: f64 = 0.6;
 
+/// What bounds a body sees so much more of the open on one side, also while some signs are wrong; of trees and shrubs even some
+/// pieces are closed.
+const WALLED: f64 = 0.8;
+
+/// With less of the open for each patch a surface hardly sees it: the sides of fins as far apart as thick have 0.02.
+const BLIND: f64 = 0.1;
+
 /// Open surfaces of fewer patches are not worth the time that they take beyond that of closed ones, and such a share of all
 /// patches.
 pub(super) const LEAST_PATCHES: u64 = 32;
@@ -42,9 +49,27 @@ pub(super) struct Choice {
 }
 
 impl Choice {
-    /// Counts all that lies in the open.
-    pub fn of(groups: Groups, patches: &Patches, sights: &Sights, stage: &Stage) -> Result<Self, Error> {
-        let flipped = groups.signs(stage)?;
+    /// Counts all that lies in the open, and what the two sides of `walls` say where that is not open: of a closed body one leads
+    /// in and the other one out, but of leaves and the ground both may be seen from above.
+    pub fn of(
+        mut groups: Groups,
+        mut walls: Vec<(u32, Link)>,
+        patches: &Patches,
+        sights: &Sights,
+        stage: &Stage,
+    ) -> Result<Self, Error> {
+        let mut flipped = groups.signs(&stage.part(0.0..0.4))?;
+        if !walls.is_empty() {
+            let seen = of_the_open(&groups, sights, &flipped)?;
+            let all = seen.iter().fold(Sight::default(), |sum, sight| sum.with(sight));
+            let is_walled = |patch: u32| seen[groups.component[patch as usize] as usize].is_walled(&all);
+            walls.retain(|&(from, link)| is_walled(from) && is_walled(link.to));
+        }
+        if !walls.is_empty() {
+            groups = groups.with(&walls, sights, patches, &stage.part(0.4..0.6))?;
+            flipped = groups.signs(&stage.part(0.6..1.0))?;
+        }
+        drop(walls);
         let is_closed = closed(&groups, sights, &flipped)?;
         let (mut open, mut all) = (0.0, 0.0);
         for (patch, &component) in patches.all.iter().zip(&groups.component) {
@@ -100,18 +125,51 @@ impl Choice {
     }
 }
 
+/// What a component sees of the open.
+#[derive(Clone, Copy, Default)]
+struct Sight {
+    /// More with its front than with its back.
+    exposure: f64,
+    all: f64,
+    patches: u64,
+}
+
+impl Sight {
+    /// Both, each with the side that it sees more from.
+    fn with(&self, other: &Self) -> Self {
+        Self {
+            exposure: self.exposure + other.exposure.abs(),
+            all: self.all + other.all,
+            patches: self.patches + other.patches,
+        }
+    }
+
+    /// Whether it bounds a body: it sees the open from one side, or as the sides of narrow gaps do hardly sees it, among others
+    /// that on the whole do.
+    fn is_walled(&self, all: &Self) -> bool {
+        let is_of_body = |sight: &Self| sight.exposure.abs() > WALLED * sight.all;
+        is_of_body(self) || is_of_body(all) && self.all < BLIND * self.patches as f64
+    }
+}
+
+/// What each component sees of the open.
+fn of_the_open(groups: &Groups, sights: &Sights, flipped: &[bool]) -> Result<Vec<Sight>, Error> {
+    let mut all = filled(Sight::default(), groups.components(), WHAT)?;
+    for (i, &component) in groups.component.iter().enumerate() {
+        let sight = &mut all[component as usize];
+        sight.exposure += f64::from(signed(flipped[i], sights.exposure[i]));
+        sight.all += f64::from(sights.all[i]);
+        sight.patches += 1;
+    }
+    Ok(all)
+}
+
 /// For each component whether it is closed, or small.
 fn closed(groups: &Groups, sights: &Sights, flipped: &[bool]) -> Result<Vec<bool>, Error> {
-    let mut sums = filled((0.0, 0.0, 0), groups.components(), WHAT)?;
-    for (i, &component) in groups.component.iter().enumerate() {
-        let (exposure, all, patches) = &mut sums[component as usize];
-        *exposure += f64::from(signed(flipped[i], sights.exposure[i]));
-        *all += f64::from(sights.all[i]);
-        *patches += 1;
-    }
     let few = (SMALL * groups.component.len() as f64) as u64;
-    let mut is_closed = filled(false, sums.len(), WHAT)?;
-    for (is_closed, (exposure, all, patches)) in is_closed.iter_mut().zip(sums) {
+    let sights = of_the_open(groups, sights, flipped)?;
+    let mut is_closed = filled(false, sights.len(), WHAT)?;
+    for (is_closed, Sight { exposure, all, patches }) in is_closed.iter_mut().zip(sights) {
         *is_closed = exposure.abs() > CLOSED * all || patches < LEAST_PATCHES && patches < few;
     }
     Ok(is_closed)
