@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::lattice::{Lattice, mixed};
 use crate::lists::reserve;
-use crate::order::sort_once;
+use crate::order::sort_unique;
 use crate::parallel::{self, Filling, Gathering};
 use crate::points::CHUNK;
 use crate::progress::Stage;
@@ -154,11 +154,11 @@ impl Bricks {
                     }
                 }
             }
-            sort_once(&mut places);
+            sort_unique(&mut places);
             found.append(places);
         })?;
         let mut found = found.all()?;
-        sort_once(&mut found);
+        sort_unique(&mut found);
         let mut places = Vec::new();
         reserve(&mut places, found.len(), "the grid")?;
         places.extend(found.into_iter().map(|[z, y, x]| IVec3::new(x as i32, y as i32, z as i32)));

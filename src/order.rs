@@ -42,7 +42,7 @@ pub(crate) fn sort(numbers: &mut Vec<i64>) {
 
 /// Sorts triples, each of which stays once. In place; whole numbers of this width for all, so that there is one such sort.
 #[inline(never)]
-pub(crate) fn sort_once(triples: &mut Vec<[i64; 3]>) {
+pub(crate) fn sort_unique(triples: &mut Vec<[i64; 3]>) {
     triples.sort_unstable();
     triples.dedup();
 }

@@ -222,9 +222,9 @@ impl Bulk {
             let mut values: Vec<i64> = bulk.sample.iter().map(|p| ordinal(p[axis])).collect();
             sort(&mut values);
             let quantile = |q: f64| from_ordinal(values[((values.len() - 1) as f64 * q + 0.5) as usize]);
-            let [first, low, median, high, last] = [0.05, 0.25, 0.5, 0.75, 0.95].map(quantile);
+            let [lowest, low, median, high, highest] = [0.05, 0.25, 0.5, 0.75, 0.95].map(quantile);
             bulk.median[axis] = median;
-            bulk.extent = bulk.extent.max(last - first);
+            bulk.extent = bulk.extent.max(highest - lowest);
             bulk.core = bulk.core.max(high - low);
         }
         bulk

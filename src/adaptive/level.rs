@@ -262,6 +262,7 @@ impl Level {
                 }
                 let mut surface = window.fit();
                 if surface.may_hide_parts() {
+                    // Whichever sample: the cubes beside have theirs.
                     surface.is_folded = window.stand_across(&surface, samples(cube)[0].place);
                 }
                 // SAFETY: once for each cube.

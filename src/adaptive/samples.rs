@@ -140,7 +140,7 @@ impl Window {
     }
 
     /// The sums over all points, each with its sample's weight, of 1, x, y, z, xx, yy, zz, yz, xz and xy; and how many points
-    /// there are.
+    /// there are. Must come before the other sums, which rely on its padding.
     pub fn moments(&mut self) -> [f64; 11] {
         self.pad();
         self.sum_lanes(|i| {

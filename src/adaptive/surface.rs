@@ -137,8 +137,8 @@ const LEFT: f64 = 0.9;
 const BESIDE: f32 = 1.0;
 const BESIDE_OF_MANY: f32 = 0.5;
 
-/// Of a fold the points next to one are so many at the least, and lie on a plane: no thicker than this share of its width, squared.
-const FOLD_POINTS: f64 = 8.0;
+/// Of a fold the points next to one are so many at the least, and lie on a plane: no thicker than this share of its height, squared.
+const FOLD_POINTS: f64 = 12.0;
 const FOLD: f64 = 0.25;
 
 /// With fewer samples a surface is taken for a plane.
@@ -399,7 +399,7 @@ fn inverse([a, b, c]: [DVec3; 3]) -> Option<[DVec3; 3]> {
 }
 
 /// The mean of some points, their normal and their covariance, from the sums of their weights and over all of x, y, z, xx, yy,
-/// zz, yz, xz and xy, and one more that does not matter; unless they lie along a line.
+/// zz, yz, xz and xy, and one more, as all have who ask; unless they lie along a line.
 #[inline(never)]
 pub(super) fn plane_of(&[total, x, y, z, xx, yy, zz, yz, xz, xy, _]: &[f64; 11]) -> Option<(DVec3, DVec3, Symmetric)> {
     let share = 1.0 / total;
@@ -411,7 +411,8 @@ pub(super) fn plane_of(&[total, x, y, z, xx, yy, zz, yz, xz, xy, _]: &[f64; 11])
     Some((mean, normal, covariance))
 }
 
-/// The two other eigenvectors of a covariance, and its eigenvalues, the largest first.
+/// The principal axes of a covariance across a normal, and the variances along them, the larger first, and along the normal. If
+/// that is an eigenvector they are the others, and these the eigenvalues.
 #[optimize(size)]
 #[inline(never)]
 fn principal(covariance: &Symmetric, normal: DVec3) -> (Vec3, Vec3, [f64; 3]) {

@@ -211,7 +211,7 @@ impl<'a> Task<'a> {
                         folded += usize::from(surface.is_folded);
                     }
                     // Noise hides what the parts could tell, also of an edge in this very cube: there is a plane in noise, or it
-                    // is as wide as the parts, and most surfaces show it within their samples.
+                    // is as wide as the parts, and most surfaces show it within their samples; unless it is folds.
                     let is_wide = || {
                         division > 0
                             && near.len() >= SHEET

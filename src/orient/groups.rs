@@ -2,7 +2,7 @@
 //! they consist of.
 
 use super::air::Sights;
-use super::links::{GRAPH, Link, Links};
+use super::links::{GRAPH, Link, Links, Pair};
 use super::looks::{Look, Looks};
 use super::patches::{Patches, turned};
 use crate::error::Error;
@@ -71,9 +71,16 @@ impl Groups {
     }
 
     /// Those with more links, told from one of their ends each.
-    pub fn with(self, told: &[(u32, Link)], sights: &Sights, patches: &Patches, stage: &Stage) -> Result<Self, Error> {
-        let mut links = self.into_links().unwrap_or_default();
-        links.add(told)?;
+    pub fn with(self, told: Vec<Pair>, sights: &Sights, patches: &Patches, stage: &Stage) -> Result<Self, Error> {
+        let count = self.component.len();
+        let links = match self.into_links() {
+            Some(mut links) => {
+                links.add(&told)?;
+                links
+            }
+            None => Links::both_ways(count, told.iter().copied())?,
+        };
+        drop(told);
         Self::of(links, sights, patches, stage)
     }
 
@@ -383,4 +390,28 @@ fn mend(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::orient::patches::Patch;
+    use crate::progress::Progress;
+    use glam::Vec3;
+
+    /// Two patches that nothing else links.
+    #[test]
+    fn walls_alone_link_two() {
+        let patch =
+            Patch { centre: Vec3::ZERO, normal: Vec3::Z, points: 16, flatness: 1.0, has_rival: false, bend: 0.0 };
+        let patches = Patches { all: vec![patch; 2], first: vec![0, 1, 2] };
+        let sights = Sights { exposure: vec![0.5, 0.0], all: vec![0.5, 0.0] };
+        let progress = Progress::silent();
+        let stage = progress.stage("the test", 0.0..1.0);
+        let groups = Groups::of(Links::both_ways(2, iter::empty()).unwrap(), &sights, &patches, &stage).unwrap();
+        assert_eq!(groups.components(), 2);
+        let groups = groups.with(vec![(0, Link { to: 1, evidence: -0.3 })], &sights, &patches, &stage).unwrap();
+        assert_eq!(groups.components(), 1);
+        assert_eq!(groups.signs(&stage).unwrap(), [false, true]);
+    }
 }

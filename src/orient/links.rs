@@ -25,6 +25,9 @@ pub(super) struct Link {
     pub evidence: f32,
 }
 
+/// A link, told from one of its ends: that, and the link to the other one.
+pub(super) type Pair = (u32, Link);
+
 /// For each patch, or each group of them, its links; a link stands in both of its ends.
 ///
 /// In many lists, because they are most of the memory: one for all would be there twice while it grows.
@@ -70,7 +73,7 @@ const LIST: usize = 1 << 14;
 impl Links {
     /// Links every patch to those in its cube and the 26 round it; `noise` is that of the points, in edges. Apart from these what
     /// the two sides of walls and gaps say, from one of its ends. One pass over the patches.
-    pub fn of(grid: &Grid, patches: &Patches, noise: f32, stage: &Stage) -> Result<(Self, Vec<(u32, Link)>), Error> {
+    pub fn of(grid: &Grid, patches: &Patches, noise: f32, stage: &Stage) -> Result<(Self, Vec<Pair>), Error> {
         let (squarings, is_clean) = (squarings(noise), noise < CLEAN);
         let runs = Filling::new(patches.all.len(), GRAPH)?;
         let found = stage.collect(grid.blocks.len(), GRAPH, &|block| {
@@ -154,27 +157,34 @@ impl Links {
         Ok((Self { runs: unsafe { runs.complete() }, lists }, concatenated(walls, GRAPH)?))
     }
 
-    /// Takes in more, that are told from one of their ends each.
-    pub fn add(&mut self, told: &[(u32, Link)]) -> Result<(), Error> {
+    /// Takes in more, told from one of their ends each; between two there may be several. The links of a list must be those of
+    /// patches one after the other, so that no more than one list is there twice.
+    pub fn add(&mut self, told: &[Pair]) -> Result<(), Error> {
         let more = Self::both_ways(self.len(), told.iter().copied())?;
-        for one in (0..more.len()).filter(|&one| !more.from(one).is_empty()) {
-            let Run { list, start, end } = self.runs[one];
-            let more = more.from(one);
-            // What it had is of no use any more where it was.
-            let had = std::mem::take(&mut self.lists[list]);
-            let added = self.push(end - start + more.len(), |longer| {
-                longer.extend_from_slice(&had[start..end]);
-                longer.extend_from_slice(more);
-            });
-            self.lists[list] = had;
-            added?;
-            self.runs.swap_remove(one);
+        let mut first = 0;
+        for (number, list) in self.lists.iter_mut().enumerate() {
+            let count = self.runs[first..].iter().take_while(|run| run.list == number).count();
+            let (runs, ones) = (&mut self.runs[first..first + count], first..first + count);
+            first += count;
+            let added: usize = ones.clone().map(|one| more.from(one).len()).sum();
+            if added == 0 {
+                continue;
+            }
+            let mut longer = Vec::new();
+            reserve(&mut longer, list.len() + added, GRAPH)?;
+            for (run, one) in runs.iter_mut().zip(ones) {
+                let start = longer.len();
+                longer.extend_from_slice(&list[run.start..run.end]);
+                longer.extend_from_slice(more.from(one));
+                (run.start, run.end) = (start, longer.len());
+            }
+            *list = longer;
         }
         Ok(())
     }
 
     /// Of so many patches, from links that are told from one of their ends each.
-    pub fn both_ways(count: usize, told: impl Iterator<Item = (u32, Link)> + Clone) -> Result<Self, Error> {
+    pub fn both_ways(count: usize, told: impl Iterator<Item = Pair> + Clone) -> Result<Self, Error> {
         let mut counts = filled(0u32, count, GRAPH)?;
         for (from, link) in told.clone() {
             counts[from as usize] += 1;
@@ -425,6 +435,23 @@ mod tests {
         let say = |points, flatness| evidence(&a, &Patch { points, flatness, ..b }, Places::NEAR_CENTRE, 5);
         assert_eq!(say(16, 1.0), 1.0);
         assert!(say(2, 1.0) <= 0.5 && say(16, 0.4) <= 0.4);
+    }
+
+    #[test]
+    fn more_links_stand_beside_those_that_were_there() {
+        let link = |to, evidence| Link { to, evidence };
+        let mut links = Links::both_ways(4, [(0, link(1, 0.5)), (2, link(1, 0.6))].into_iter()).unwrap();
+        links.add(&[(0, link(3, -0.3)), (1, link(3, -0.2))]).unwrap();
+        let from = |one| {
+            let mut all = links.from(one).to_vec();
+            all.sort_by_key(|link| link.to);
+            all
+        };
+        assert_eq!(links.len(), 4);
+        assert_eq!(from(0), [link(1, 0.5), link(3, -0.3)]);
+        assert_eq!(from(1), [link(0, 0.5), link(2, 0.6), link(3, -0.2)]);
+        assert_eq!(from(2), [link(1, 0.6)]);
+        assert_eq!(from(3), [link(0, -0.3), link(1, -0.2)]);
     }
 
     #[test]

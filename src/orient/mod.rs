@@ -3,11 +3,10 @@
 //! `docs/orientation.md` explains the rule, its sources and its limits. In short: the points of each small cube are parted
 //! into patches ([`patches`]), a patch and those round it say whether their signs agree ([`links`]), and so do the two sides of a
 //! wall ([`walls`]), which sides of a patch are open to the air says which way is out ([`air`]), and the signs are chosen that
-//! these agree with best ([`groups`]), of
-//! open surfaces also what their parts see of each other ([`looks`]). These then face what stands before them ([`facing`]), or the
-//! scanner, if one saw all: where it stood, if densities tell that ([`station`]), or the direction from which it did ([`view`]).
-//! Of a few points that are no surface, what is round them tells the side ([`specks`]). In noise normals then become means of
-//! those about them ([`means`]).
+//! these agree with best ([`groups`]), of open surfaces also what their parts see of each other ([`looks`]). These then face what
+//! stands before them ([`facing`]), or the scanner, if one saw all: where it stood, if densities tell that ([`station`]), or the
+//! direction from which it did ([`view`]). Of a few points that are no surface, what is round them tells the side ([`specks`]).
+//! In noise normals then become means of those about them ([`means`]).
 
 mod air;
 mod ball;
@@ -50,7 +49,7 @@ use components::decide;
 use cubes::Cubes;
 use glam::{DVec3, Vec3};
 use groups::Groups;
-use links::{Link, Links};
+use links::{Links, Pair};
 use looks::Looks;
 use patches::{Members, Patches};
 use signs::{Choice, Signs};
@@ -135,10 +134,10 @@ fn surfaces(
     let ball = Ball::of(grid);
     let sights = air::sights(&ball, grid, &patches, points.len(), &stage.part(0.5..0.55))?;
     let (links, walls) = Links::of(grid, &patches, *noise, &stage.part(0.55..0.7))?;
-    let groups = Groups::of(links, &sights, &patches, &stage.part(0.7..0.85))?;
-    let choosing = stage.part(0.85..0.9);
+    let groups = Groups::of(links, &sights, &patches, &stage.part(0.7..0.8))?;
+    let choosing = stage.part(0.8..0.9);
     let (choice, looks, scanner) = match options.orient {
-        Orient::Outward => (outward(groups, walls, &patches, &sights, &choosing)?, None, None),
+        Orient::Outward => (outward((groups, walls), &patches, &sights, &choosing)?, None, None),
         _ => consistent((groups, walls), &ball, grid, &patches, *noise, &sights, &choosing)?,
     };
     let (mut signs, links) = choice.into_signs();
@@ -176,8 +175,7 @@ enum Scanner {
 
 /// Signs that count all of the open, but of what is not closed a share: much of that sees the open with its inside.
 fn outward(
-    groups: Groups,
-    walls: Vec<(u32, Link)>,
+    (groups, walls): (Groups, Vec<Pair>),
     patches: &Patches,
     sights: &Sights,
     stage: &Stage,
@@ -193,7 +191,7 @@ fn outward(
 /// each other; but not where all was seen from one place, because that is open all over behind, and the hollow side of it looks
 /// at itself. Also these looks, if there is anything that is not closed, and the scanner, if there was one.
 fn consistent(
-    (groups, walls): (Groups, Vec<(u32, Link)>),
+    (groups, walls): (Groups, Vec<Pair>),
     ball: &Ball,
     grid: &Grid,
     patches: &Patches,
@@ -201,18 +199,18 @@ fn consistent(
     sights: &Sights,
     stage: &Stage,
 ) -> Result<(Choice, Option<Looks>, Option<Scanner>), Error> {
-    let mut choice = Choice::of(groups, walls, patches, sights, &stage.part(0.0..0.3))?;
+    let mut choice = Choice::of(groups, walls, patches, sights, &stage.part(0.0..0.6))?;
     let mut looks = None;
     if choice.is_any_open() {
         looks = Some(Looks::from_the_open(grid, patches, sights)?);
-        choice.trust_links(&stage.part(0.3..0.4))?;
+        choice.trust_links(&stage.part(0.6..0.65))?;
     }
     let scanner = match Station::of(ball, grid, patches, choice.signs(), choice.is_all_closed())? {
         Some(station) => Some(Scanner::At(station)),
-        None => view(&mut choice, (ball, grid, patches), noise, sights, &stage.part(0.4..0.6))?.map(Scanner::Towards),
+        None => view(&mut choice, (ball, grid, patches), noise, sights, &stage.part(0.65..0.8))?.map(Scanner::Towards),
     };
     if looks.is_some() && scanner.is_none() {
-        choice.be_cautious(looks.as_ref(), sights, &stage.part(0.6..1.0))?;
+        choice.be_cautious(looks.as_ref(), sights, &stage.part(0.8..1.0))?;
     }
     Ok((choice, looks, scanner))
 }

@@ -39,12 +39,8 @@ const SHARE: f32 = 0.5;
 
 /// The squares of the cosines between its normal and those of the two are no less: what lies behind it is the other side of a wall,
 /// and what goes on in it no other face. Leaves lie anyhow.
-const PARALLEL: f32 = 0.8;
+pub(super) const PARALLEL: f32 = 0.8;
 const ALIKE: f32 = 0.2;
-
-/// It has so many points, and is so flat: what has fewer, or some of a face beyond an edge, may have any normal.
-const LEAST: u32 = 4;
-const FLAT: f32 = 0.8;
 
 /// What is near a cube, and may part patches of that from others.
 pub(super) struct Thirds {
@@ -92,11 +88,10 @@ impl Thirds {
         off.cmpgt(Vec4::splat(IN_LINE * self.off * self.off)).bitmask()
     }
 
-    /// Takes what is near a cube: patches, each with the step to its own.
+    /// Takes what is near a cube: patches, each with the step to its own. Only plain ones part others.
     pub fn gather<'a>(&mut self, near: impl Iterator<Item = (Vec3, &'a Patch)>) {
         self.near.clear();
-        let may_part = |patch: &Patch| patch.points >= LEAST && patch.flatness >= FLAT;
-        self.near.extend(near.filter(|(_, patch)| may_part(patch)).map(|(step, &patch)| (step, patch)));
+        self.near.extend(near.filter(|(_, patch)| patch.is_plain()).map(|(step, &patch)| (step, patch)));
         self.fours.clear();
         let four = |near: &[(Vec3, Patch)]| Four::of(first_four(near).each_ref().map(|(step, patch)| (*step, patch)));
         self.fours.extend(self.near.chunks(4).map(four));
@@ -262,7 +257,7 @@ mod tests {
         let [below, above, middle] = [-0.4, 0.4, 0.0].map(|z| patch(Vec3::new(0.1 * z, 0.0, z), Vec3::Z));
         let are_parted = |middle| are_parted([below, above, middle].map(|patch| (patch, Vec3::ZERO)));
         assert!(are_parted(middle));
-        assert!(!are_parted(Patch { points: LEAST - 1, ..middle }));
+        assert!(!are_parted(Patch { points: 3, ..middle }));
         assert!(!are_parted(Patch { flatness: 0.7, ..middle }));
     }
 }

@@ -37,6 +37,11 @@ impl Patch {
         self.normal.dot(other.normal).powi(16)
     }
 
+    /// Whether its normal is that of a surface: few points, or some of a face beyond an edge, may have any.
+    pub fn is_plain(&self) -> bool {
+        self.points >= PLAIN_POINTS && self.flatness >= PLAIN_FLATNESS
+    }
+
     /// How much there is of it, up to 1: few points may be anything.
     pub fn certainty(&self) -> f32 {
         if self.points < CERTAIN { self.points as f32 / CERTAIN as f32 } else { 1.0 }
@@ -116,6 +121,10 @@ const EXACT: f32 = 0.0075;
 
 /// Patches less alike than so, as those of the two faces of an edge, are no rivals.
 const UNLIKE: f32 = 0.1;
+
+/// Patches of so many points, and so flat, are plain.
+const PLAIN_POINTS: u32 = 4;
+const PLAIN_FLATNESS: f32 = 0.8;
 
 /// Patches of so many points are certain.
 const CERTAIN: u32 = 8;

@@ -3,7 +3,7 @@
 use super::air::Sights;
 use super::ball::STRAYS;
 use super::groups::Groups;
-use super::links::{Link, Links};
+use super::links::{Links, Pair};
 use super::looks::Looks;
 use super::patches::{Patches, signed};
 use crate::error::Error;
@@ -53,23 +53,23 @@ impl Choice {
     /// in and the other one out, but of leaves and the ground both may be seen from above.
     pub fn of(
         mut groups: Groups,
-        mut walls: Vec<(u32, Link)>,
+        mut walls: Vec<Pair>,
         patches: &Patches,
         sights: &Sights,
         stage: &Stage,
     ) -> Result<Self, Error> {
-        let mut flipped = groups.signs(&stage.part(0.0..0.4))?;
+        let mut flipped = groups.signs(&stage.part(0.0..0.3))?;
         if !walls.is_empty() {
-            let seen = of_the_open(&groups, sights, &flipped)?;
-            let all = seen.iter().fold(Sight::default(), |sum, sight| sum.with(sight));
-            let is_walled = |patch: u32| seen[groups.component[patch as usize] as usize].is_walled(&all);
+            let openness = openness(&groups, sights, &flipped)?;
+            let whole = openness.iter().fold(Openness::default(), Openness::with);
+            let is_walled = |patch: u32| openness[groups.component[patch as usize] as usize].is_walled(&whole);
             walls.retain(|&(from, link)| is_walled(from) && is_walled(link.to));
         }
         if !walls.is_empty() {
-            groups = groups.with(&walls, sights, patches, &stage.part(0.4..0.6))?;
-            flipped = groups.signs(&stage.part(0.6..1.0))?;
+            drop(flipped);
+            groups = groups.with(walls, sights, patches, &stage.part(0.3..0.7))?;
+            flipped = groups.signs(&stage.part(0.7..1.0))?;
         }
-        drop(walls);
         let is_closed = closed(&groups, sights, &flipped)?;
         let (mut open, mut all) = (0.0, 0.0);
         for (patch, &component) in patches.all.iter().zip(&groups.component) {
@@ -127,16 +127,16 @@ impl Choice {
 
 /// What a component sees of the open.
 #[derive(Clone, Copy, Default)]
-struct Sight {
+struct Openness {
     /// More with its front than with its back.
     exposure: f64,
     all: f64,
     patches: u64,
 }
 
-impl Sight {
-    /// Both, each with the side that it sees more from.
-    fn with(&self, other: &Self) -> Self {
+impl Openness {
+    /// With another one, that faces where it sees more.
+    fn with(self, other: &Self) -> Self {
         Self {
             exposure: self.exposure + other.exposure.abs(),
             all: self.all + other.all,
@@ -144,22 +144,22 @@ impl Sight {
         }
     }
 
-    /// Whether it bounds a body: it sees the open from one side, or as the sides of narrow gaps do hardly sees it, among others
-    /// that on the whole do.
-    fn is_walled(&self, all: &Self) -> bool {
-        let is_of_body = |sight: &Self| sight.exposure.abs() > WALLED * sight.all;
-        is_of_body(self) || is_of_body(all) && self.all < BLIND * self.patches as f64
+    /// Whether it bounds a body: it sees the open from one side, or as the sides of narrow gaps do hardly sees it, where the
+    /// `whole` cloud sees it from one side.
+    fn is_walled(&self, whole: &Self) -> bool {
+        let is_of_body = |one: &Self| one.exposure.abs() > WALLED * one.all;
+        is_of_body(self) || is_of_body(whole) && self.all < BLIND * self.patches as f64
     }
 }
 
 /// What each component sees of the open.
-fn of_the_open(groups: &Groups, sights: &Sights, flipped: &[bool]) -> Result<Vec<Sight>, Error> {
-    let mut all = filled(Sight::default(), groups.components(), WHAT)?;
+fn openness(groups: &Groups, sights: &Sights, flipped: &[bool]) -> Result<Vec<Openness>, Error> {
+    let mut all = filled(Openness::default(), groups.components(), WHAT)?;
     for (i, &component) in groups.component.iter().enumerate() {
-        let sight = &mut all[component as usize];
-        sight.exposure += f64::from(signed(flipped[i], sights.exposure[i]));
-        sight.all += f64::from(sights.all[i]);
-        sight.patches += 1;
+        let one = &mut all[component as usize];
+        one.exposure += f64::from(signed(flipped[i], sights.exposure[i]));
+        one.all += f64::from(sights.all[i]);
+        one.patches += 1;
     }
     Ok(all)
 }
@@ -167,10 +167,26 @@ fn of_the_open(groups: &Groups, sights: &Sights, flipped: &[bool]) -> Result<Vec
 /// For each component whether it is closed, or small.
 fn closed(groups: &Groups, sights: &Sights, flipped: &[bool]) -> Result<Vec<bool>, Error> {
     let few = (SMALL * groups.component.len() as f64) as u64;
-    let sights = of_the_open(groups, sights, flipped)?;
-    let mut is_closed = filled(false, sights.len(), WHAT)?;
-    for (is_closed, Sight { exposure, all, patches }) in is_closed.iter_mut().zip(sights) {
+    let openness = openness(groups, sights, flipped)?;
+    let mut is_closed = filled(false, openness.len(), WHAT)?;
+    for (is_closed, Openness { exposure, all, patches }) in is_closed.iter_mut().zip(openness) {
         *is_closed = exposure.abs() > CLOSED * all || patches < LEAST_PATCHES && patches < few;
     }
     Ok(is_closed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_bounds_a_body_has_walls() {
+        let openness = |exposure, all| Openness { exposure, all, patches: 100 };
+        let (body, ground) = (openness(90.0, 100.0), openness(20.0, 100.0));
+        assert!(body.is_walled(&ground) && !ground.is_walled(&ground) && !ground.is_walled(&body));
+        // It hardly sees the open, among what sees it from one side, and among what sees it from both.
+        let gap = openness(1.0, 5.0);
+        assert!(gap.is_walled(&body) && !gap.is_walled(&ground));
+        assert_eq!(openness(-3.0, 4.0).with(&openness(-1.0, 2.0)).exposure, -2.0);
+    }
 }

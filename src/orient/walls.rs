@@ -5,7 +5,7 @@
 //! evidence to links (`links.rs`), because to these noise on one surface looks the same; but what is as far off as noise hardly ever
 //! is, is another surface. It is not so where something is open: of leaves and the ground below both may be seen from above.
 
-use super::parted::Thirds;
+use super::parted::{PARALLEL, Thirds};
 use super::patches::Patch;
 use glam::Vec3;
 
@@ -18,22 +18,14 @@ const FAR: f32 = 1.8;
 /// So far beside each other at the most, in edges, squared: steps lie farther.
 const BESIDE: f32 = 0.12;
 
-/// And they are parallel: the square of the cosine.
-const PARALLEL: f32 = 0.8;
-
-/// Of so many points each, and so flat.
-const POINTS: u32 = 4;
-const FLAT: f32 = 0.8;
-
 /// What it counts, against links that count up to 1.
 const WEIGHT: f32 = 0.3;
 
 /// What speaks for the signs of a patch and of another one, `step` cubes away, to agree, if these are the two sides of a wall or a
 /// gap; `thirds` was [looked](Thirds::look) at from the first. The same from both ends, to the bit.
 pub(super) fn across(own: &Patch, other: &Patch, step: Vec3, thirds: &Thirds) -> Option<f32> {
-    let is_plain = |patch: &Patch| patch.points >= POINTS && patch.flatness >= FLAT;
     let cosine = own.normal.dot(other.normal);
-    if cosine * cosine < PARALLEL || !is_plain(own) || !is_plain(other) {
+    if cosine * cosine < PARALLEL || !own.is_plain() || !other.is_plain() {
         return None;
     }
     let line = step + (other.centre - own.centre);
@@ -54,13 +46,27 @@ mod tests {
         Patch { centre: Vec3::new(x, 0.0, z), normal, points: 16, flatness: 1.0, has_rival: false, bend: 0.0 }
     }
 
-    /// What the first of some patches in one cube and the second say; from both ends.
+    /// What the first of some patches and the second say, these two in one cube, or where the second one is seen from the next one
+    /// along x or z too; from both ends.
     fn says(noise: f32, patches: &[Patch]) -> Option<f32> {
+        let told = [Vec3::ZERO, Vec3::X, -Vec3::Z].map(|step| says_from(step, noise, patches));
+        assert!(
+            told.iter().all(|one| one.map(f32::is_sign_negative) == told[0].map(f32::is_sign_negative)),
+            "{told:?}"
+        );
+        told[0]
+    }
+
+    fn says_from(step: Vec3, noise: f32, patches: &[Patch]) -> Option<f32> {
+        // The second stands in the cube so far on, in the same place.
+        let mut patches: Vec<(Vec3, Patch)> = patches.iter().map(|&patch| (Vec3::ZERO, patch)).collect();
+        patches[1] = (step, Patch { centre: patches[1].1.centre - step, ..patches[1].1 });
         let mut thirds = Thirds::new(noise, "the test").unwrap();
-        thirds.gather(patches.iter().map(|patch| (Vec3::ZERO, patch)));
         let [there, back] = [(0, 1), (1, 0)].map(|(from, to)| {
-            thirds.look(&patches[from]);
-            across(&patches[from], &patches[to], Vec3::ZERO, &thirds)
+            let ((place, own), (other_place, other)) = (patches[from], patches[to]);
+            thirds.gather(patches.iter().map(|(step, patch)| (step - place, patch)));
+            thirds.look(&own);
+            across(&own, &other, other_place - place, &thirds)
         });
         assert_eq!(there, back);
         there
@@ -72,16 +78,19 @@ mod tests {
         assert!(says(0.0, &[near, patch(0.0, 0.4, Vec3::Z)]).is_some_and(|evidence| evidence < 0.0));
         assert!(says(0.0, &[near, patch(0.0, 0.4, -Vec3::Z)]).is_some_and(|evidence| evidence > 0.0));
         // As if seen askew.
-        assert!(says(0.0, &[near, patch(0.0, 0.4, Vec3::new(0.3, 0.0, 1.0).normalize())]).is_some());
+        let askew = Vec3::new(0.3, 0.0, 1.0).normalize();
+        assert!(says(0.0, &[near, patch(0.0, 0.4, askew)]).is_some_and(|evidence| evidence < 0.0));
     }
 
     #[test]
     fn what_is_no_wall_says_nothing() {
         let near = patch(0.0, -0.4, Vec3::Z);
-        // Noise, a step, the side of a groove, and few points.
+        // Noise, a step, the side of a groove, what is too far off, few points, and those of more faces.
         assert_eq!(says(0.21, &[near, patch(0.0, 0.4, Vec3::Z)]), None);
         assert_eq!(says(0.0, &[near, patch(0.5, 0.4, Vec3::Z)]), None);
         assert_eq!(says(0.0, &[near, patch(0.0, 0.4, Vec3::X)]), None);
+        assert_eq!(says(0.0, &[near, patch(0.0, 1.5, Vec3::Z)]), None);
+        assert_eq!(says(0.0, &[near, Patch { flatness: 0.7, ..patch(0.0, 0.4, Vec3::Z) }]), None);
         assert_eq!(says(0.0, &[near, Patch { points: 3, ..patch(0.0, 0.4, Vec3::Z) }]), None);
     }
 
