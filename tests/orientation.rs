@@ -214,7 +214,8 @@ fn fins_and_teeth_face_outwards() {
     }
 }
 
-/// The sides of a hollow ball, of walls three and a half spacings thick, with a round opening whose rim is next to nothing of it.
+/// The sides of a hollow ball, of walls ten spacings thick, too thick to tell them, with a round opening whose rim is next to
+/// nothing of it.
 #[test]
 fn the_inside_of_a_hollow_body_faces_its_hollow() {
     let mut random = Random(45);
@@ -225,12 +226,12 @@ fn the_inside_of_a_hollow_body_faces_its_hollow() {
                 break direction;
             }
         };
-        let (radius, side) = if random.unit() < 0.5 { (1.0, 1.0) } else { (0.93, -1.0) };
+        let (radius, side) = if random.unit() < 0.5 { (1.0, 1.0) } else { (0.8, -1.0) };
         (turn(direction.map(|c| radius * c)), turn(direction.map(|c| side * c)))
     }));
     let rim = Cloud::of((0..150).map(|_| {
         let (sin, cos) = (TAU * random.unit()).sin_cos();
-        let (radius, slant) = (0.93 + 0.07 * random.unit(), 0.95f64.acos());
+        let (radius, slant) = (0.8 + 0.2 * random.unit(), 0.95f64.acos());
         let point = [slant.sin() * cos, slant.sin() * sin, slant.cos()].map(|c| radius * c);
         (turn(point), turn([-slant.cos() * cos, -slant.cos() * sin, slant.sin()]))
     }));
