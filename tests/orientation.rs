@@ -214,33 +214,36 @@ fn fins_and_teeth_face_outwards() {
     }
 }
 
-/// The sides of a hollow ball, of walls ten spacings thick, too thick to tell them, with a round opening whose rim is next to
-/// nothing of it.
+/// The sides of a hollow ball, with a round opening whose rim is next to nothing of it: of walls three and a half spacings thick,
+/// which tell them, and ten, which do not, so that the touch at the opening does.
 #[test]
 fn the_inside_of_a_hollow_body_faces_its_hollow() {
-    let mut random = Random(45);
-    let shell = Cloud::of((0..60_000).map(|_| {
-        let direction = loop {
-            let direction = random.direction();
-            if direction[2] < 0.95 {
-                break direction;
-            }
-        };
-        let (radius, side) = if random.unit() < 0.5 { (1.0, 1.0) } else { (0.8, -1.0) };
-        (turn(direction.map(|c| radius * c)), turn(direction.map(|c| side * c)))
-    }));
-    let rim = Cloud::of((0..150).map(|_| {
-        let (sin, cos) = (TAU * random.unit()).sin_cos();
-        let (radius, slant) = (0.8 + 0.2 * random.unit(), 0.95f64.acos());
-        let point = [slant.sin() * cos, slant.sin() * sin, slant.cos()].map(|c| radius * c);
-        (turn(point), turn([-slant.cos() * cos, -slant.cos() * sin, slant.sin()]))
-    }));
-    let ball = joined([shell, rim]);
-    for how in [Orient::Consistent, Orient::Outward] {
-        let result = orient(&ball.points, how);
-        assert_eq!(share_right(&result.normals, &ball.normals), 1.0, "{how:?}");
-        let sides: Vec<Side> = components(&result).iter().map(|component| component.side).collect();
-        assert!(sides.contains(&Side::Air) && sides.contains(&Side::Touch), "{how:?}: {sides:?}");
+    for (inner, is_touch) in [(0.93, false), (0.8, true)] {
+        let mut random = Random(45);
+        let shell = Cloud::of((0..60_000).map(|_| {
+            let direction = loop {
+                let direction = random.direction();
+                if direction[2] < 0.95 {
+                    break direction;
+                }
+            };
+            let (radius, side) = if random.unit() < 0.5 { (1.0, 1.0) } else { (inner, -1.0) };
+            (turn(direction.map(|c| radius * c)), turn(direction.map(|c| side * c)))
+        }));
+        let rim = Cloud::of((0..150).map(|_| {
+            let (sin, cos) = (TAU * random.unit()).sin_cos();
+            let (radius, slant) = (inner + (1.0 - inner) * random.unit(), 0.95f64.acos());
+            let point = [slant.sin() * cos, slant.sin() * sin, slant.cos()].map(|c| radius * c);
+            (turn(point), turn([-slant.cos() * cos, -slant.cos() * sin, slant.sin()]))
+        }));
+        let ball = joined([shell, rim]);
+        for how in [Orient::Consistent, Orient::Outward] {
+            let result = orient(&ball.points, how);
+            assert_eq!(share_right(&result.normals, &ball.normals), 1.0, "{inner}, {how:?}");
+            let sides: Vec<Side> = components(&result).iter().map(|component| component.side).collect();
+            assert!(sides.contains(&Side::Air), "{inner}, {how:?}: {sides:?}");
+            assert_eq!(sides.contains(&Side::Touch), is_touch, "{inner}, {how:?}: {sides:?}");
+        }
     }
 }
 
