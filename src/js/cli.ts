@@ -1,19 +1,16 @@
 #!/usr/bin/env node
 // The command line: a PLY in, the same PLY with normals out.
-import { randomBytes } from 'node:crypto';
-import { rmSync } from 'node:fs';
-import { type FileHandle, open, readFile, realpath, rename, stat } from 'node:fs/promises';
-import { basename, dirname, join } from 'node:path';
-import { pathToFileURL } from 'node:url';
+import { readFile } from 'node:fs/promises';
 import { parseArgs } from 'node:util';
+import { checkOutput, openInput, plain, writeOutput } from './disk.js';
 import { type BilinormalError, createEstimator } from './node.js';
 import { scannerOf } from './scanner.js';
-import type { EstimateOptions, PointCloud, Progress, Report, Source } from './types.js';
+import type { EstimateOptions, PointCloud, Progress, Report } from './types.js';
 
 const help = `Usage: bilinormal IN.ply -o OUT.ply [options]
 
 Computes one normal for each point of a PLY file, and writes the file with nx ny nz; every other property and element
-is kept, existing normals are replaced. IN may be - for standard input.
+is kept, existing normals are replaced. IN may be - for standard input, and packed with gzip; OUT.ply.gz will be.
 
   -o, --out FILE         where the result goes; it appears there when it is complete, so IN itself is allowed
       --method NAME      bilinear (default), knn or egg
@@ -163,7 +160,7 @@ async function run(task: Task): Promise<Report> {
     const ply = await about(task.input, () =>
       estimator.writePly(source, additions, { format, onProgress: show?.('writing') }),
     );
-    await about(task.output, () => writeWhole(task.output, ply));
+    await about(task.output, () => writeOutput(task.output, ply));
     return report;
   } finally {
     estimator.dispose();
@@ -190,41 +187,6 @@ async function about<T>(file: string, work: () => Promise<T>): Promise<T> {
   }
 }
 
-/** The text of an error, on one line; of Node's errors about files, what a person needs. */
-function plain(error: unknown): string {
-  const { code, message } = error as NodeJS.ErrnoException;
-  const texts: Record<string, string> = {
-    ENOENT: 'no such file or folder',
-    EACCES: 'permission denied',
-    EISDIR: 'it is a folder',
-    ENOTDIR: 'a part of the path is not a folder',
-    ENOSPC: 'no space left on the device',
-    EROFS: 'the file system is read-only',
-  };
-  return texts[code ?? ''] ?? (message ?? String(error)).replace(/\s*\n\s*/g, ' ');
-}
-
-/** A regular file is read piece by piece in the worker, twice; what can be read only once is kept. */
-async function openInput(path: string): Promise<Source> {
-  if (path === '-') {
-    const pieces: Uint8Array[] = [];
-    for await (const piece of process.stdin) pieces.push(piece);
-    return new Blob(pieces as BlobPart[]);
-  }
-  const found = await stat(path);
-  if (found.isDirectory()) throw Object.assign(new Error(), { code: 'EISDIR' });
-  return found.isFile() ? pathToFileURL(path) : new Blob([await readFile(path)]);
-}
-
-/** Before the work, not after it. */
-async function checkOutput(path: string): Promise<void> {
-  const existing = await stat(path).catch(() => undefined);
-  if (existing?.isDirectory()) throw Object.assign(new Error(), { code: 'EISDIR' });
-  // To replace it needs no permission but that of the folder.
-  if (existing && (existing.mode & 0o222) === 0) throw new Error('the file is read-only, and stays as it is');
-  if (!(await stat(dirname(path))).isDirectory()) throw Object.assign(new Error(), { code: 'ENOTDIR' });
-}
-
 /** The command line speaks of the file's coordinates, the estimator of positions relative to the cloud's origin. */
 function orientIn(cloud: PointCloud, orient: Task['orient']): EstimateOptions['orient'] {
   if (orient === 'scanner') {
@@ -236,47 +198,6 @@ function orientIn(cloud: PointCloud, orient: Task['orient']): EstimateOptions['o
   const [x, y, z] = orient.viewpoint;
   const { origin } = cloud;
   return { viewpoint: [x - origin[0], y - origin[1], z - origin[2]] };
-}
-
-/** Under a temporary name beside `path`, then renamed: nobody ever sees half a file. */
-async function writeWhole(path: string, contents: Blob): Promise<void> {
-  // A link keeps pointing where it points, and a file keeps its permissions.
-  const target = await realpath(path).catch(() => path);
-  const existing = await stat(target).catch(() => undefined);
-  // A device or a pipe is written to, never replaced.
-  if (existing && !existing.isFile()) return writePieces(await open(target, 'w'), contents);
-
-  const temporary = join(dirname(target), `.${basename(target)}.${randomBytes(4).toString('hex')}`);
-  const remove = () => rmSync(temporary, { force: true });
-  const interrupted = (signal: NodeJS.Signals) => {
-    remove();
-    // As if nobody had listened.
-    process.removeAllListeners(signal);
-    process.kill(process.pid, signal);
-  };
-  process.on('SIGINT', interrupted).on('SIGTERM', interrupted);
-  try {
-    const file = await open(temporary, 'wx');
-    if (existing) await file.chmod(existing.mode);
-    await writePieces(file, contents);
-    await rename(temporary, target);
-  } catch (error) {
-    remove();
-    throw error;
-  } finally {
-    process.off('SIGINT', interrupted).off('SIGTERM', interrupted);
-  }
-}
-
-async function writePieces(file: FileHandle, contents: Blob): Promise<void> {
-  const pieceBytes = 1 << 23;
-  try {
-    for (let at = 0; at < contents.size; at += pieceBytes) {
-      await file.writeFile(new Uint8Array(await contents.slice(at, at + pieceBytes).arrayBuffer()));
-    }
-  } finally {
-    await file.close();
-  }
 }
 
 function showProgress(title: string) {

@@ -5,7 +5,7 @@ import { existsSync, readFileSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { join } from 'node:path';
 import { after, afterEach, before, test as nodeTest } from 'node:test';
-import { gunzipSync } from 'node:zlib';
+import { gunzipSync, gzipSync } from 'node:zlib';
 import { data } from '../node/data.mjs';
 import { parsePly } from '../node/ply.mjs';
 import {
@@ -256,7 +256,9 @@ test('a bad file gives a message that can be read, and the cloud before stays', 
   // What to do depends on what it is, not on the words of the reader.
   for (const [name, bytes, remedy] of [
     ['flight.las', 'LASF\0\0\0\0', /is a LAS or LAZ file\. .*CloudCompare .* save scans as PLY\.$/],
-    ['ball.ply.gz', '\x1f\x8b\x08', /is packed with gzip\. Unpack it, /],
+    ['ball.ply.gz', '\x1f\x8b\x08', /is packed with gzip, and cannot be unpacked here\. Unpack it, /],
+    ['flight.las.gz', gzipSync('LASF'), /is a LAS or LAZ file\. /],
+    ['bunny.tar.gz', gzipSync(`bunny/`.padEnd(257, '\0') + 'ustar'), /is a tar archive\. Unpack it, /],
     ['castle.spz', '\x1f\x8b\x08', /holds Gaussian splats\. .*SuperSplat.* saves splats as PLY\.$/],
     ['utf16.ply', '\xff\xfep\0l\0y\0', /is text in UTF-16\. Save it as ASCII or UTF-8\.$/],
     ['nothing.ply', '', /is empty\.$/],
@@ -276,6 +278,23 @@ test('a bad file gives a message that can be read, and the cloud before stays', 
   assert.deepEqual({ ...after, error: undefined }, before);
   await page.getByRole('button', { name: 'Dismiss the message' }).click();
   assert.ok(await page.locator('#error').isHidden());
+});
+
+test('a scan packed with gzip is unpacked, also among others, and one that is cut off leaves what is shown', async () => {
+  page = await browser.openPage(browser.isolated);
+  const packed = gzipSync(spherePly(5_000));
+  await drop(page, 'ball.ply.gz', packed, { before: ['photo.jpg'] });
+  const before = await result(page, 'ball.ply');
+  assert.equal(before.error, undefined);
+  assert.match(before.headline, / for 5,000 points$/);
+  const { name, bytes } = await save(page);
+  assert.equal(name, 'ball-normals.ply');
+  assert.equal(readSaved(bytes).length, 6 * 5_000);
+
+  await drop(page, 'cut.ply.gz', packed.subarray(0, packed.length / 2));
+  const { error, ...after } = await result(page, 'cut.ply');
+  assert.match(error, /^cut\.ply\.gz is packed with gzip, and cannot be unpacked here\. /);
+  assert.deepEqual({ ...after, error: undefined }, before);
 });
 
 test('a file of one point ends too, without a normal', async () => {
@@ -1414,9 +1433,8 @@ test('real scans stand upright', { skip: !existsSync(SCANS) && `no ${SCANS}` }, 
     ['igea.ply', 'y'],
     ['cilantro_frame_1.ply', '-y'],
   ]) {
-    const bytes = readFileSync(join(SCANS, name));
-    await choose(page, name, name.endsWith('.gz') ? gunzipSync(bytes) : bytes);
-    await result(page, name);
+    await choose(page, name, readFileSync(join(SCANS, name)));
+    await result(page, name.replace('.gz', ''));
     assert.equal(await upAxis().inputValue(), up, name);
   }
 });

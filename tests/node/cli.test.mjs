@@ -4,6 +4,7 @@ import { spawn, spawnSync } from 'node:child_process';
 import { mkdirSync, readFileSync, readdirSync, statSync, symlinkSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { test } from 'node:test';
+import { gunzipSync, gzipSync } from 'node:zlib';
 import { deviation, sphere } from './clouds.mjs';
 import { installPacked } from './packed.mjs';
 import { parsePly, propertyOf, withoutNormals } from './ply.mjs';
@@ -170,6 +171,26 @@ test('an output that is read-only stays as it is, also behind a link', () => {
     );
   }
   assert.ok(readFileSync(path).equals(ply));
+});
+
+test('files packed with gzip are unpacked, also from standard input, and packed if their name says so', () => {
+  const packed = gzipSync(ply);
+  writeFileSync(join(folder, 'sphere.ply.gz'), packed);
+  const quiet = (...args) => [...args, '--quiet'];
+  assert.equal(run(quiet('sphere.ply', '-o', 'plain.ply')).status, 0);
+  const expected = readFileSync(join(folder, 'plain.ply'));
+  assert.equal(run(quiet('sphere.ply.gz', '-o', 'unpacked.ply')).status, 0);
+  assert.ok(readFileSync(join(folder, 'unpacked.ply')).equals(expected));
+  assert.equal(run(quiet('-', '-o', 'unpacked.ply'), { input: packed }).status, 0);
+  assert.ok(readFileSync(join(folder, 'unpacked.ply')).equals(expected));
+  assert.equal(run(quiet('sphere.ply.gz', '-o', 'sphere.ply.gz')).status, 0);
+  assert.ok(gunzipSync(readFileSync(join(folder, 'sphere.ply.gz'))).equals(expected));
+
+  writeFileSync(join(folder, 'cut.ply.gz'), packed.subarray(0, packed.length / 2));
+  const { status, stderr } = run(['cut.ply.gz', '-o', 'never.ply']);
+  assert.equal(status, 1);
+  assert.match(stderr, /^bilinormal: cut\.ply\.gz: packed with gzip, and damaged: .+\n$/);
+  assert.ok(!readdirSync(folder).includes('never.ply'));
 });
 
 test('standard input and devices', { skip: process.platform === 'win32' }, () => {

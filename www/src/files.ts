@@ -1,8 +1,9 @@
 // Files that come to the page and leave it: scans from a disk, the sample, what is saved.
 import { BilinormalError, readPointCloud, type PointCloud } from 'bilinormal';
-import { foreign } from './foreign';
+import { damaged, foreign } from './foreign';
 import { measure } from './format';
 import type { Step } from './jobs';
+import { isPacked, unpack } from './packed';
 
 const SAMPLE_POINTS = 500_000;
 
@@ -10,6 +11,16 @@ const SAMPLE_POINTS = 500_000;
 export async function onlyScans(files: File[]): Promise<File[]> {
   const reasons = await Promise.all(files.map(foreign));
   return files.filter((_, i) => !reasons[i]);
+}
+
+/** The file that is in one packed with gzip, or the file itself. */
+export async function unpacked(file: File, { signal, begin }: Step): Promise<File> {
+  if (!(await isPacked(file))) return file;
+  const reason = await foreign(file);
+  if (reason) throw reason;
+  return unpack(file, signal, begin(`Unpacking ${file.name}`)).catch(() => {
+    throw damaged();
+  });
 }
 
 export async function read(file: File, { signal, begin }: Step): Promise<PointCloud> {

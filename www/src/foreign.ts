@@ -1,8 +1,10 @@
 // What to tell a person whose file is no PLY: what it is, as far as its name or its beginning say, and what to do with it.
+import { GZIP, beginningOf } from './packed';
 
 const TOOLS = 'CloudCompare and MeshLab, among others, save scans as PLY.';
 const CONVERT = `Only PLY files can be opened; ${TOOLS}`;
 const UNPACK = 'Unpack it, then open the PLY file in it.';
+const DAMAGED = 'is packed with gzip, and cannot be unpacked here';
 
 /** The first that fits counts: a name tells more than how the file is packed. */
 const KINDS: { name?: RegExp; begins?: RegExp; is: string; remedy: string }[] = [
@@ -11,7 +13,8 @@ const KINDS: { name?: RegExp; begins?: RegExp; is: string; remedy: string }[] = 
     is: 'holds Gaussian splats',
     remedy: 'Only PLY files can be opened; SuperSplat, among others, saves splats as PLY.',
   },
-  { begins: /^\x1f\x8b/, is: 'is packed with gzip', remedy: UNPACK },
+  { begins: GZIP, is: DAMAGED, remedy: UNPACK },
+  { begins: /^[^]{257}ustar/, is: 'is a tar archive', remedy: UNPACK },
   { begins: /^PK\x03\x04/, is: 'is packed with zip', remedy: UNPACK },
   { begins: /^(BZh|\xfd7zXZ|\x28\xb5\x2f\xfd|7z\xbc\xaf|Rar!)/, is: 'is packed', remedy: UNPACK },
   { begins: /^(\xff\xfe|\xfe\xff|p\0l\0y\0)/, is: 'is text in UTF-16', remedy: 'Save it as ASCII or UTF-8.' },
@@ -27,15 +30,20 @@ const KINDS: { name?: RegExp; begins?: RegExp; is: string; remedy: string }[] = 
 /** Why a file cannot be opened, as what follows its name. */
 export class Foreign extends Error {}
 
-/** Undefined for a file that begins as a PLY does, and for one that cannot be read, which says so by itself. */
+/** Of a packed one that only begins as a scan does. */
+export const damaged = (): Foreign => new Foreign(`${DAMAGED}. ${UNPACK}`);
+
+/**
+ * Undefined for a file that begins as a PLY does, also once it is unpacked, and for one that cannot be read, which says so by
+ * itself.
+ */
 export async function foreign(file: File): Promise<Foreign | undefined> {
-  let bytes: ArrayBuffer;
+  let begin: string;
   try {
-    bytes = await file.slice(0, 64).arrayBuffer();
+    begin = await beginningOf(file);
   } catch {
     return undefined;
   }
-  const begin = String.fromCharCode(...new Uint8Array(bytes));
   // As the reader takes it: in any case, and after a byte order mark.
   if (/^(\xef\xbb\xbf)?ply/i.test(begin)) return undefined;
   if (begin === '') return new Foreign('is empty.');

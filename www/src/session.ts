@@ -4,7 +4,7 @@ import { BilinormalError, estimateNormals, writePly, type EstimateOptions } from
 import { scannerOf } from '../../src/js/scanner';
 import { boundsOf } from './bounds';
 import { compare } from './compare';
-import { checkRoom, download, makeSample, onlyScans, read } from './files';
+import { checkRoom, download, makeSample, onlyScans, read, unpacked } from './files';
 import { foreign } from './foreign';
 import { count } from './format';
 import { createJobs, messageOf, type Step } from './jobs';
@@ -82,8 +82,9 @@ export function createSession(store: Store, viewer: Viewer): Session {
   /** What can be brought back. */
   let gone: Flipped | undefined;
 
-  async function show(file: File, step: Step): Promise<void> {
+  async function show(given: File, step: Step): Promise<void> {
     const started = performance.now();
+    const file = await unpacked(given, step);
     const cloud = await read(file, step);
     step.signal.throwIfAborted();
     if (cloud.count === 0) throw new Error('the file holds no points');
