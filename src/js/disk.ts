@@ -1,8 +1,8 @@
 // The files of the command line, from and to a disk or a pipe, packed with gzip or not.
 import { randomBytes } from 'node:crypto';
 import { createReadStream, rmSync } from 'node:fs';
-import { type FileHandle, open, realpath, rename, stat } from 'node:fs/promises';
-import { basename, dirname, join } from 'node:path';
+import { type FileHandle, access, constants, open, readlink, realpath, rename, stat } from 'node:fs/promises';
+import { dirname, join, resolve, sep } from 'node:path';
 import { Readable, type Transform } from 'node:stream';
 import { pipeline } from 'node:stream/promises';
 import { pathToFileURL } from 'node:url';
@@ -24,22 +24,34 @@ export async function openInput(path: string): Promise<Source> {
 /** Before the work, not after it. */
 export async function checkOutput(path: string): Promise<void> {
   const existing = await stat(path).catch(() => undefined);
-  if (existing?.isDirectory()) throw Object.assign(new Error(), { code: 'EISDIR' });
+  const isFolder = existing?.isDirectory() || path.endsWith('/') || path.endsWith(sep);
+  if (isFolder) throw Object.assign(new Error(), { code: existing ? 'EISDIR' : 'ENOENT' });
   // To replace it needs no permission but that of the folder.
   if (existing && (existing.mode & 0o222) === 0) throw new Error('the file is read-only, and stays as it is');
-  if (!(await stat(dirname(path))).isDirectory()) throw Object.assign(new Error(), { code: 'ENOTDIR' });
+  if (existing && !existing.isFile()) return;
+  const folder = dirname(await targetOf(path));
+  if (!(await stat(folder)).isDirectory()) throw Object.assign(new Error(), { code: 'ENOTDIR' });
+  await access(folder, constants.W_OK);
+}
+
+/** Where a path leads, through links, also where there is nothing yet: a link keeps pointing where it points. */
+async function targetOf(path: string, most = 40): Promise<string> {
+  const link = await readlink(path).catch(() => undefined);
+  if (link === undefined) return path;
+  if (most === 0) throw new Error('the link leads in a circle');
+  return targetOf(resolve(await realpath(dirname(path)), link), most - 1);
 }
 
 /** Under a temporary name beside `path`, then renamed: nobody ever sees half a file. Packed, if it is to be a .gz. */
 export async function writeOutput(path: string, contents: Blob): Promise<void> {
   const packed = /\.gz$/i.test(path) ? await through(Readable.from(piecesOf(contents)), createGzip()) : contents;
-  // A link keeps pointing where it points, and a file keeps its permissions.
-  const target = await realpath(path).catch(() => path);
+  const target = await targetOf(path);
+  // It keeps its permissions.
   const existing = await stat(target).catch(() => undefined);
   // A device or a pipe is written to, never replaced.
   if (existing && !existing.isFile()) return writePieces(await open(target, 'w'), packed);
 
-  const temporary = join(dirname(target), `.${basename(target)}.${randomBytes(4).toString('hex')}`);
+  const temporary = join(dirname(target), `.bilinormal-${randomBytes(4).toString('hex')}`);
   const remove = () => rmSync(temporary, { force: true });
   const interrupted = (signal: NodeJS.Signals) => {
     remove();
@@ -47,7 +59,8 @@ export async function writeOutput(path: string, contents: Blob): Promise<void> {
     process.removeAllListeners(signal);
     process.kill(process.pid, signal);
   };
-  process.on('SIGINT', interrupted).on('SIGTERM', interrupted);
+  const signals = ['SIGINT', 'SIGTERM', 'SIGHUP'] as const;
+  for (const signal of signals) process.on(signal, interrupted);
   try {
     const file = await open(temporary, 'wx');
     if (existing) await file.chmod(existing.mode);
@@ -57,7 +70,7 @@ export async function writeOutput(path: string, contents: Blob): Promise<void> {
     remove();
     throw error;
   } finally {
-    process.off('SIGINT', interrupted).off('SIGTERM', interrupted);
+    for (const signal of signals) process.off(signal, interrupted);
   }
 }
 

@@ -1,5 +1,5 @@
 // The worker, in Node.
-import { closeSync, fstatSync, openSync, readSync } from 'node:fs';
+import { closeSync, openSync, readSync, statSync } from 'node:fs';
 import { readFile } from 'node:fs/promises';
 import { availableParallelism } from 'node:os';
 import { fileURLToPath } from 'node:url';
@@ -44,7 +44,11 @@ function open(url: string): OpenFile {
   return {
     get size() {
       try {
-        return (size ??= using((file) => fstatSync(file).size));
+        if (size !== undefined) return size;
+        const found = statSync(fileURLToPath(url));
+        // To open a pipe may take for ever.
+        if (!found.isFile()) throw new Error(found.isDirectory() ? 'it is a folder' : 'it is a pipe or a device');
+        return (size = found.size);
       } catch (error) {
         throw coded('input', `the file could not be read: ${(error as Error).message}`);
       }

@@ -462,6 +462,11 @@ test('wrong arguments are input errors that say what came and what was wanted', 
     [() => readPointCloud({}), /source is Object\(\); wanted/],
     [() => readPointCloud(new Blob(), { maxPoints: -1 }), /-1; wanted/],
     [() => readPointCloud(pathToFileURL(join(project, 'missing.ply'))), /could not be read.*ENOENT/],
+    [() => readPointCloud(pathToFileURL(project)), /could not be read: it is a folder/],
+    // Which has no end, and a pipe that nobody writes to not even a beginning.
+    ...(process.platform === 'win32'
+      ? []
+      : [[() => readPointCloud(new URL('file:///dev/zero')), /could not be read: it is a pipe or a device/]]),
     [() => readPointCloud(new URL('file://elsewhere/scan.ply')), /could not be read.*host/],
     [() => readPointCloud(new URL('http://127.0.0.1:1/scan.ply')), /127\.0\.0\.1:1\/scan\.ply did not load/],
     [() => writePly(undefined, {}), /source is undefined; wanted/],

@@ -154,7 +154,21 @@ test('input and output may be the same file; links and permissions stay', () => 
   if (process.platform !== 'win32') {
     symlinkSync('same.ply', join(folder, 'link.ply'));
     assert.equal(run(['link.ply', '-o', 'link.ply', '--quiet']).status, 0);
+    // Also through two links, where there is nothing yet.
+    mkdirSync(join(folder, 'deep'));
+    symlinkSync('deep/second.ply', join(folder, 'first.ply'));
+    symlinkSync('new.ply', join(folder, 'deep', 'second.ply'));
+    assert.equal(run(['same.ply', '-o', 'first.ply', '--quiet']).status, 0);
+    assert.ok(readFileSync(join(folder, 'deep', 'new.ply')).equals(once));
+    symlinkSync('circle.ply', join(folder, 'circle.ply'));
+    assert.match(
+      run(['same.ply', '-o', 'circle.ply']).stderr,
+      /^bilinormal: circle\.ply: the link leads in a circle\n$/,
+    );
   }
+  const longest = `${'n'.repeat(251)}.ply`;
+  assert.equal(run(['same.ply', '-o', longest, '--quiet']).status, 0);
+  assert.ok(readFileSync(join(folder, longest)).equals(once));
   assert.ok(readFileSync(path).equals(once), 'normals are replaced, not added');
   assert.equal(propertyOf(written('link.ply'), 'vertex', 'nx').values.length, 20000);
 });
@@ -172,6 +186,16 @@ test('an output that is read-only stays as it is, also behind a link', () => {
   }
   assert.ok(readFileSync(path).equals(ply));
 });
+
+test(
+  'a folder that nothing can be written to is told before the work',
+  { skip: process.platform === 'win32' || process.getuid() === 0 },
+  () => {
+    mkdirSync(join(folder, 'closed'), { mode: 0o555 });
+    const { status, stderr } = run(['missing.ply', '-o', 'closed/out.ply']);
+    assert.deepEqual({ status, stderr }, { status: 1, stderr: 'bilinormal: closed/out.ply: permission denied\n' });
+  },
+);
 
 test('files packed with gzip are unpacked, also from standard input, and packed if their name says so', () => {
   const packed = gzipSync(ply);
@@ -272,6 +296,7 @@ test('an error ends with 1 and one line that names the file; no output appears',
     [['points.xyz', '-o', 'never.ply'], /^bilinormal: points\.xyz: .*(ply|PLY).*\n$/],
     [['empty.ply', '-o', 'never.ply'], /^bilinormal: empty\.ply: .+\n$/],
     [['sphere.ply', '-o', 'no/never.ply'], /^bilinormal: no\/never\.ply: no such file or folder\n$/],
+    [['sphere.ply', '-o', 'new/'], /^bilinormal: new\/: no such file or folder\n$/],
     [['sphere.ply', '-o', '..'], /^bilinormal: \.\.: it is a folder\n$/],
   ];
   for (const [args, message] of cases) {
@@ -288,19 +313,20 @@ test('an interrupted run leaves no half file', { skip: process.platform === 'win
   const count = 500000;
   const large = Buffer.concat([Buffer.from(header(count)), Buffer.from(sphere(count).buffer)]);
   writeFileSync(join(folder, 'large.ply'), large);
-  const child = spawn(process.execPath, [cli, 'large.ply', '-o', 'interrupted.ply', '--ascii'], {
-    cwd: folder,
-    stdio: 'ignore',
-  });
-  const ended = new Promise((resolve) => child.once('exit', (code, signal) => resolve({ code, signal })));
-  let running = true;
-  ended.then(() => (running = false));
-  // As soon as the temporary file is there, if it is seen at all.
-  while (running && !leftovers().length) await new Promise((resolve) => setTimeout(resolve, 1));
-  child.kill('SIGINT');
-  const { code, signal } = await ended;
-  assert.deepEqual(leftovers(), []);
-  const complete = readdirSync(folder).includes('interrupted.ply');
-  assert.ok(complete ? code === 0 || signal === 'SIGINT' : signal === 'SIGINT', `code ${code}, signal ${signal}`);
-  if (complete) assert.equal(propertyOf(written('interrupted.ply'), 'vertex', 'nz').values.length, count);
+  // Ctrl+C, and a terminal that is closed.
+  for (const sent of ['SIGINT', 'SIGHUP']) {
+    const name = `${sent}.ply`;
+    const child = spawn(process.execPath, [cli, 'large.ply', '-o', name, '--ascii'], { cwd: folder, stdio: 'ignore' });
+    const ended = new Promise((resolve) => child.once('exit', (code, signal) => resolve({ code, signal })));
+    let running = true;
+    ended.then(() => (running = false));
+    // As soon as the temporary file is there, if it is seen at all.
+    while (running && !leftovers().length) await new Promise((resolve) => setTimeout(resolve, 1));
+    child.kill(sent);
+    const { code, signal } = await ended;
+    assert.deepEqual(leftovers(), []);
+    const complete = readdirSync(folder).includes(name);
+    assert.ok(complete ? code === 0 || signal === sent : signal === sent, `code ${code}, signal ${signal}`);
+    if (complete) assert.equal(propertyOf(written(name), 'vertex', 'nz').values.length, count);
+  }
 });
