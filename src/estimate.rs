@@ -218,6 +218,9 @@ fn adaptive(mut points: Points, cloud: &Cloud, options: &Options, mut laps: Laps
 fn bilinear(points: Points, cloud: &Cloud, options: &Options, edge: f64, mut laps: Laps) -> Result<Estimate, Error> {
     let progress = laps.progress;
     progress.update("cellSize", 0.03)?;
+    // Larger cubes hold the same, all in the first one, and single precision has less of the places there.
+    let longest = cloud.bounds.extent().max_element();
+    let edge = if longest > 0.0 { edge.min(2.0 * longest) } else { edge };
     let lattice = Lattice::new(&cloud.bounds, &|| Bulk::of_points(&points).median, edge, CUBES);
     laps.end("cellSize");
     let source = Source::new(&points, lattice);

@@ -46,6 +46,18 @@ fn planes_are_exact() {
     }
 }
 
+/// As of millimetres taken for metres: however large, it is one cube, and one plane.
+#[test]
+fn a_cube_larger_than_the_cloud_is_the_plane_of_it_all() {
+    let cloud = plane(1_000, 6, unit([1.0, -2.0, 3.0]));
+    for size in [10.0, 500.0, 1e6, 1e30] {
+        let result = run(&cloud.points, Cell::Size(size));
+        assert_eq!((result.report.unresolved, result.report.cells), (0, 1), "{size}");
+        let worst = worst(&angles(&result.normals, &cloud.normals));
+        assert!(worst < 0.01, "{size}: {worst} degrees");
+    }
+}
+
 /// The surface variation of a small disc of radius a: a^2 / 24 on the unit sphere, a^2 / 32 on a cylinder of radius 1.
 #[test]
 fn curvature_of_the_nearest_points_is_that_of_discs() {
