@@ -1,4 +1,5 @@
 // How far a cloud reaches, without being fooled by stray or non-finite points.
+import { nth } from './spread';
 
 export interface Bounds {
   /** Middle of the bulk of the points. */
@@ -19,16 +20,18 @@ const STRAY = 0.005;
 /** The bounds of `positions` (x0 y0 z0 x1 ...), if there is a finite point. */
 export function boundsOf(positions: Float32Array): Bounds | undefined {
   const points = positions.length / 3;
-  const step = Math.max(1, Math.floor(points / SAMPLE));
-  const values = [0, 1, 2].map((axis) => {
-    const column = new Float32Array(Math.ceil(points / step));
+  const length = Math.min(points, SAMPLE);
+  /** What is finite of the points looked at, sorted. */
+  const sorted = (of: (at: number) => number) => {
+    const values = new Float32Array(length);
     let count = 0;
-    for (let i = 0; i < points; i += step) {
-      const value = positions[3 * i + axis]!;
-      if (Number.isFinite(value)) column[count++] = value;
+    for (let k = 0; k < length; k++) {
+      const value = of(3 * nth(k, points, length));
+      if (Number.isFinite(value)) values[count++] = value;
     }
-    return column.subarray(0, count).sort();
-  });
+    return values.subarray(0, count).sort();
+  };
+  const values = [0, 1, 2].map((axis) => sorted((at) => positions[at + axis]!));
   const quantile = (axis: number, share: number) => {
     const column = values[axis]!;
     return column.length === 0 ? 0 : column[Math.round(share * (column.length - 1))]!;
@@ -39,20 +42,17 @@ export function boundsOf(positions: Float32Array): Bounds | undefined {
   const extent = low.map((value, axis) => high[axis]! - value) as Bounds['extent'];
 
   let squaredReach = -1;
-  const squares = new Float64Array(Math.ceil(points / step));
-  let sampled = 0;
-  for (let i = 0; i < points; i++) {
-    const x = positions[3 * i]! - centre[0];
-    const y = positions[3 * i + 1]! - centre[1];
-    const z = positions[3 * i + 2]! - centre[2];
+  for (let at = 0; at < positions.length; at += 3) {
+    const x = positions[at]! - centre[0];
+    const y = positions[at + 1]! - centre[1];
+    const z = positions[at + 2]! - centre[2];
     const square = x * x + y * y + z * z;
-    if (!(square < Infinity)) continue;
-    if (square > squaredReach) squaredReach = square;
-    if (i % step === 0) squares[sampled++] = square;
+    if (square < Infinity && square > squaredReach) squaredReach = square;
   }
   if (squaredReach < 0) return undefined;
-  const bulk = squares.subarray(0, sampled).sort();
-  const most = sampled === 0 ? 0 : Math.sqrt(bulk[Math.floor((1 - 2 * STRAY) * (sampled - 1))]!);
+  const [x, y, z] = centre;
+  const distances = sorted((at) => Math.hypot(positions[at]! - x, positions[at + 1]! - y, positions[at + 2]! - z));
+  const most = distances[Math.floor((1 - 2 * STRAY) * (distances.length - 1))] ?? 0;
   const reach = Math.sqrt(squaredReach) || 1;
   // Without strays the whole cloud is framed; a lone far point is not allowed to shrink the rest to a dot.
   const radius = (reach < 1.5 * most ? reach : most) || reach;

@@ -1,4 +1,5 @@
 // The point under a ray, for clicks: the nearest to the eye of those close to the ray.
+import { nth } from './spread';
 
 type Vector = readonly [number, number, number];
 
@@ -11,12 +12,13 @@ const SAMPLE = 1_000_000;
  */
 export function pickPoint(positions: Float32Array, eye: Vector, along: Vector, slope: number, radius: number): number {
   const points = positions.length / 3;
-  const step = Math.max(1, Math.floor(points / SAMPLE));
+  const count = Math.min(points, SAMPLE);
   // Those looked at stand for the others.
-  const reach = radius * Math.sqrt(step);
+  const reach = radius * Math.sqrt(points / count);
   let best = -1;
   let nearest = Infinity;
-  for (let i = 0; i < points; i += step) {
+  for (let k = 0; k < count; k++) {
+    const i = nth(k, points, count);
     const x = positions[3 * i]! - eye[0];
     const y = positions[3 * i + 1]! - eye[1];
     const z = positions[3 * i + 2]! - eye[2];

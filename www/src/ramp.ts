@@ -1,4 +1,5 @@
 // Curvature as colour: viridis, whose steps look equal and whose lightness rises throughout (Smith and van der Walt 2015).
+import { nth } from './spread';
 
 /** Every eighth part of viridis, sRGB. */
 const STOPS = [0x440154, 0x472d7b, 0x3b528b, 0x2c728e, 0x21918c, 0x28ae80, 0x5ec962, 0xaddc30, 0xfde725];
@@ -15,11 +16,9 @@ const LEAST = 1e-6;
  * the quantile.
  */
 export function colorsOf(curvature: Float32Array): Uint8Array {
-  const step = Math.max(1, Math.floor(curvature.length / SAMPLE));
-  const sample = Float32Array.from(
-    { length: Math.ceil(curvature.length / step) },
-    (_, i) => curvature[i * step]!,
-  ).sort();
+  const points = curvature.length;
+  const length = Math.min(points, SAMPLE);
+  const sample = Float32Array.from({ length }, (_, k) => curvature[nth(k, points, length)]!).sort();
   const end = Math.max(LEAST, sample[Math.floor(QUANTILE * (sample.length - 1))] ?? 0);
   const ramp = makeRamp();
   const colors = new Uint32Array(curvature.length);

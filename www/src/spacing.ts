@@ -8,7 +8,7 @@ const NEIGHBOURS = 8;
 /** Share of the probes whose neighbours are no further: what is thinly covered does not make blobs of the rest. */
 const QUANTILE = 0.9;
 
-/** The edge of the square that a point has for itself on the surface; `Infinity` if all are in one place. */
+/** The edge of the square that a point has for itself on the surface; `Infinity` if all are in one place, or none is finite of those looked at. */
 export function spacingOf(positions: Float32Array): number {
   const all = positions.length / 3;
   const sample = new Float32Array(3 * Math.min(all, SAMPLE));
@@ -19,7 +19,8 @@ export function spacingOf(positions: Float32Array): number {
   }
   const taken = sample.subarray(0, 3 * count);
   const distances = Float64Array.from({ length: Math.min(count, PROBES) }, (_, probe) => reachOf(probe, taken)).sort();
-  const distance = distances[Math.floor(QUANTILE * (distances.length - 1))] ?? Infinity;
+  const distance = distances[Math.floor(QUANTILE * (distances.length - 1))];
+  if (distance === undefined) return Infinity;
   // The disc round a probe holds so many points of the sample, and as many more of all as there are.
   return distance * Math.sqrt((Math.PI / NEIGHBOURS) * (count / all));
 }

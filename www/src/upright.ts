@@ -1,5 +1,6 @@
 // Which axis of a cloud points up, where its file does not tell.
 import type { Bounds } from './bounds';
+import { nth } from './spread';
 import type { Up } from './viewer';
 
 /** Points looked at to find out how a cloud stands. */
@@ -52,12 +53,14 @@ function steadiness(positions: Float32Array, { centre, extent }: Bounds, axis: n
     const angle = (2 * Math.PI * i) / DIRECTIONS;
     return { cosine: Math.cos(angle), sine: Math.sin(angle), reach: -Infinity };
   });
-  const step = 3 * Math.max(1, Math.floor(positions.length / 3 / SAMPLE));
+  const points = positions.length / 3;
+  const looked = Math.min(points, SAMPLE);
   let [sumU, sumV, sumW, count] = [0, 0, 0, 0];
-  for (let i = 0; i < positions.length; i += step) {
-    const w = positions[i + axes[0]]! - centre[axes[0]];
-    const u = positions[i + axes[1]]! - centre[axes[1]];
-    const v = positions[i + axes[2]]! - centre[axes[2]];
+  for (let k = 0; k < looked; k++) {
+    const at = 3 * nth(k, points, looked);
+    const w = positions[at + axes[0]]! - centre[axes[0]];
+    const u = positions[at + axes[1]]! - centre[axes[1]];
+    const v = positions[at + axes[2]]! - centre[axes[2]];
     // Strays carry nothing; neither does what is not finite.
     if (!(Math.abs(w) <= height && Math.abs(u) <= width && Math.abs(v) <= depth)) continue;
     count++;
