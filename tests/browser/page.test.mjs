@@ -276,6 +276,19 @@ test('a bad file gives a message that can be read, and the cloud before stays', 
   const { error, ...after } = await result(page, 'ball.ply');
   assert.match(error, /^short\.ply: ./);
   assert.deepEqual({ ...after, error: undefined }, before);
+  // It is read out once, and not whenever anything else changes.
+  const changes = await page.evaluate(() => {
+    let changes = 0;
+    const observer = new MutationObserver((found) => (changes += found.length));
+    observer.observe(document.querySelector('#error'), { childList: true, characterData: true, subtree: true });
+    const size = document.querySelector('#point-size');
+    for (const value of [1, 2]) {
+      size.value = value;
+      size.dispatchEvent(new Event('input', { bubbles: true }));
+    }
+    return new Promise((resolve) => setTimeout(() => resolve(changes)));
+  });
+  assert.equal(changes, 0);
   await page.getByRole('button', { name: 'Dismiss the message' }).click();
   assert.ok(await page.locator('#error').isHidden());
 });
@@ -856,12 +869,14 @@ test('flips that a new result or another file takes away can be brought back', a
   await oriented('As found', 'balls.ply');
   assert.ok(!(await isFlipped()));
   assert.match(await note.innerText(), /^Re-run undid your flips\./);
-  // Computed again as it was, signs and all.
+  // Computed again as it was, signs and all; and what has the focus keeps it.
+  await flip.focus();
   await page.keyboard.press('Control+z');
   await page.waitForFunction(() => document.querySelector('[data-do=flip]').ariaPressed === 'true');
   await result(page, 'balls.ply');
   assert.ok(await note.isHidden());
   assert.ok(await orientation('Consistent').isChecked());
+  assert.equal(await page.evaluate(() => document.activeElement.dataset.do), 'flip');
   assert.deepEqual(readSaved((await save(page)).bytes), turned);
 
   // What is saved is not lost.
@@ -883,6 +898,45 @@ test('flips that a new result or another file takes away can be brought back', a
   await drop(page, 'balls.ply', spherePly(5_000));
   await result(page, 'balls.ply');
   assert.ok(await note.isHidden());
+});
+
+test('what is brought back stands as it was turned, and tells what it faces', async () => {
+  page = await browser.openPage(browser.isolated);
+  const rod = spherePly(20_000, { centres: [-4, -3, -2, -1, 0, 1, 2, 3, 4].map((y) => [0, y, 0]) });
+  const said = 'comment scanner position: 0 0 30\nelement';
+  await drop(page, 'rod.ply', Buffer.from(rod.toString('latin1').replace('element', said), 'latin1'));
+  await result(page, 'rod.ply');
+  assert.equal(await upAxis().inputValue(), 'y');
+  const isUpright = async () => (await brightestShown(page, { x: 688, y: 80, side: 60 })) > 100;
+  assert.ok(await isUpright());
+  await upAxis().selectOption('x');
+  assert.ok(!(await isUpright()));
+  await oriented('Scanner', 'rod.ply');
+  await page.getByRole('button', { name: 'Flip all' }).click();
+  const told = /away from the scanner/;
+  assert.match(await page.locator('#facts').innerText(), told);
+  await drop(page, 'other.ply', spherePly(5_000));
+  await result(page, 'other.ply');
+  await page.locator('#note').getByRole('button', { name: 'Bring back' }).click();
+  await result(page, 'rod.ply');
+  assert.match(await page.locator('#facts').innerText(), told);
+  assert.equal(await upAxis().inputValue(), 'x');
+  assert.ok(!(await isUpright()));
+});
+
+test('the cloud stays in sight while the window changes its size', async () => {
+  page = await browser.openPage(browser.isolated);
+  await drop(page, 'ball.ply', spherePly(20_000));
+  await result(page, 'ball.ply');
+  await page.evaluate(() => {
+    const { style } = document.querySelector('#canvas');
+    const change = (frame) => {
+      style.width = `${innerWidth - (frame % 40)}px`;
+      if (frame < 600) requestAnimationFrame(() => change(frame + 1));
+    };
+    change(0);
+  });
+  for (let shot = 0; shot < 3; shot++) assert.ok((await brightestShown(page)) > 100, `picture ${shot}`);
 });
 
 test('one surface is turned by a click, or by Enter in the middle of the view', async () => {

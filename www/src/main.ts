@@ -1,10 +1,10 @@
 // Puts the page together: what a person does goes to the session and the state, what the state says goes to the view.
-import { count, measure } from './format';
+import { measure } from './format';
 import { drawHero } from './hero';
 import { element, showState } from './panel';
 import { createSession, type Session } from './session';
 import { METHODS, type CellKind, type Method, type OrientKind } from './options';
-import { addNote, createStore, type NormalSource, type Store } from './state';
+import { createStore, type NormalSource, type Store } from './state';
 import { missing } from './support';
 import { createViewer, type Margins, type Shading, type Up, type Viewer } from './viewer';
 
@@ -18,17 +18,12 @@ for (const kind of ['dragover', 'drop']) addEventListener(kind, (event) => event
 let unsupported = await missing();
 let viewer: Viewer | undefined;
 try {
-  if (!unsupported) viewer = createViewer(element('#canvas'), { onPart: tellPart });
+  if (!unsupported) viewer = createViewer(element('#canvas'), { onPart: (drawn) => store.set({ drawn }) });
 } catch {
   unsupported = 'This page draws with WebGL 2, which did not start. It may after a restart of the browser.';
 }
 if (viewer) start(viewer);
 store.set({ unsupported, ready: viewer !== undefined });
-
-function tellPart(points: number): void {
-  const text = `The graphics card has no memory for all points: ${count(points)} of them are drawn. Normals are computed and saved for all.`;
-  addNote(store, text);
-}
 
 function start(viewer: Viewer): void {
   const session = createSession(store, viewer);
@@ -59,8 +54,12 @@ function start(viewer: Viewer): void {
     sample: () => void session.openSample(),
     fit: () => viewer.fit(),
     help: openHelp,
-    flip: () => session.flip(),
-    turn: () => turnSurfaces(!store.state.turning),
+    flip: () => {
+      if (!store.state.job) session.flip();
+    },
+    turn: () => {
+      if (!store.state.job) turnSurfaces(!store.state.turning);
+    },
     undo: () => session.undoFlip(),
     done: () => turnSurfaces(false),
     save: () => {
@@ -71,7 +70,7 @@ function start(viewer: Viewer): void {
     back: () => {
       if (!store.state.job) void session.bringBack();
     },
-    read: () => store.set({ note: undefined }),
+    read: () => store.set({ note: undefined, drawn: undefined }),
   };
   for (const button of document.querySelectorAll<HTMLButtonElement>('[data-do]')) {
     button.addEventListener('click', actions[button.dataset['do']!]!);

@@ -46,7 +46,7 @@ export function showState(store: Store): void {
     // Near the buttons as long as there is nothing else to see.
     const trouble = state.unsupported ?? (start.hidden ? undefined : error);
     notice.hidden = trouble === undefined;
-    notice.textContent = trouble ?? '';
+    write('#notice', trouble ?? '');
     notice.scrollIntoView({ block: 'nearest' });
     for (const button of document.querySelectorAll<HTMLButtonElement>('[data-do=choose], [data-do=sample]')) {
       button.disabled = !state.ready;
@@ -59,7 +59,7 @@ export function showState(store: Store): void {
     check('shading', state.shading);
     check('source', state.source);
     element('#source').hidden = !scan?.hadNormals;
-    element<HTMLFieldSetElement>('#source').disabled = !scan?.hasNormals || busy;
+    element<HTMLFieldSetElement>('#source').disabled = !scan?.hasNormals;
     element<HTMLSelectElement>('#up').value = state.up;
     radio('shading', 'colors').disabled = !scan?.hasColors;
     radio('shading', 'shaded').disabled = radio('shading', 'normals').disabled = !scan?.hasNormals && !busy;
@@ -70,12 +70,14 @@ export function showState(store: Store): void {
     backs.checked = state.backs;
     backs.disabled = !scan?.hasNormals && !busy;
     const flip = element<HTMLButtonElement>('[data-do=flip]');
-    flip.disabled = !scan?.hasNormals || busy;
+    flip.disabled = !scan?.hasNormals;
+    rest(flip, busy);
     flip.setAttribute('aria-pressed', String(state.flipped));
     const turn = element<HTMLButtonElement>('[data-do=turn]');
-    turn.disabled = !hasSurfaces(state.used?.orient) || busy;
+    turn.disabled = !hasSurfaces(state.used?.orient);
+    rest(turn, busy);
     turn.setAttribute('aria-pressed', String(state.turning));
-    const turning = state.turning && !turn.disabled;
+    const turning = state.turning && !turn.disabled && !busy;
     document.documentElement.classList.toggle('turning', turning);
     element('#hint').hidden = !turning;
     element<HTMLButtonElement>('[data-do=undo]').disabled = !state.flipped && state.turnedSurfaces.size === 0;
@@ -87,7 +89,7 @@ export function showState(store: Store): void {
 
     showOptions(state, busy);
     showError(start.hidden ? error : undefined);
-    showNote(state.note, busy);
+    showNote(state, busy);
     showJob(state);
     const same =
       before?.scan === scan &&
@@ -107,10 +109,11 @@ function moveFocus({ scan, job }: State): void {
 }
 
 /** For those who hear the page: what begins, what a flip has done, and what else there is to know. */
-function tell({ job, flipped, turnedSurfaces, note }: State, before: State | undefined): void {
+function tell(state: State, before: State | undefined): void {
+  const { job, flipped, turnedSurfaces } = state;
   const told = element('#told');
   // A note comes with a job, and is told when that no longer speaks.
-  if (before?.job?.title !== job?.title) told.textContent = job?.title ?? note?.text ?? '';
+  if (before?.job?.title !== job?.title) told.textContent = job?.title ?? notesOf(state);
   else if (!before || job) return;
   else if (before.flipped !== flipped) told.textContent = flipped ? 'All flipped' : 'All flipped back';
   else if (before.turnedSurfaces !== turnedSurfaces) {
@@ -175,12 +178,22 @@ function showOptions(state: State, busy: boolean): void {
 function showError(error: string | undefined): void {
   const box = element('#error');
   box.hidden = error === undefined;
-  element('#error p').textContent = error ?? '';
+  write('#error p', error ?? '');
 }
 
-function showNote(note: State['note'], busy: boolean): void {
-  element('#note').hidden = note === undefined;
-  write('#note p', note?.text ?? '');
+/** What there is to know, if nothing went wrong. */
+function notesOf({ note, drawn }: State): string {
+  const part =
+    drawn !== undefined &&
+    `The graphics card has no memory for all points: ${count(drawn)} of them are drawn. Normals are computed and saved for all.`;
+  return [note?.text, part].filter(Boolean).join(' ');
+}
+
+function showNote(state: State, busy: boolean): void {
+  const { note } = state;
+  const text = notesOf(state);
+  element('#note').hidden = text === '';
+  write('#note p', text);
   const back = element('#note [data-do=back]');
   back.hidden = !note?.isOfFlips;
   rest(back, busy);
@@ -269,7 +282,7 @@ function signsOf({ components, points }: Report, { scan, used, flipped, turnedSu
     return [fact(flipped ? 'downwards' : 'upwards', `along ${up[axis]! < 0 ? '−' : ''}${'XYZ'[axis]}`)];
   }
   const way = flipped ? 'away from' : 'towards';
-  if (used.orient.viewpoint === scan?.scanner) return [fact(`${way} the scanner`, 'as the file says')];
+  if (String(used.orient.viewpoint) === String(scan?.scanner)) return [fact(`${way} the scanner`, 'as the file says')];
   return [fact(`${way} the camera`, 'as it was')];
 }
 

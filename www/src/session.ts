@@ -97,8 +97,8 @@ export function createSession(store: Store, viewer: Viewer): Session {
     const shading = store.state.shading === 'colors' && !hasColors ? 'shaded' : store.state.shading;
     // Gaussian splats bring zeros.
     const normals = cloud.normals?.some((value) => value !== 0) ? cloud.normals : undefined;
-    // In a task of its own: by then the worker has begun with the normals.
-    const drawn = new Promise((resolve) => setTimeout(resolve)).then(() => viewer.show(cloud, bounds, up));
+    // In a task of its own: by then the worker has begun with the normals, and what is brought back has its own way up.
+    const drawn = new Promise((resolve) => setTimeout(resolve)).then(() => viewer.show(cloud, bounds, store.state.up));
     const before = areSaved ? undefined : flippedNow();
     const name = shown?.file.name;
     shown = { file, positions: cloud.positions, normals, drawn };
@@ -122,6 +122,7 @@ export function createSession(store: Store, viewer: Viewer): Session {
       used: undefined,
       ...UNTURNED,
       comparison: undefined,
+      drawn: undefined,
       source: 'computed',
       turning: false,
       up,

@@ -62,6 +62,8 @@ export interface State extends OptionsForm, Turned {
   error: string | undefined;
   /** What else there is to know: nothing went wrong. */
   note: Note | undefined;
+  /** How many of the points are drawn, if the graphics card has no memory for all. */
+  drawn: number | undefined;
   shading: Shading;
   source: NormalSource;
   /** Whether what points away from the camera has a colour of its own. */
@@ -91,6 +93,7 @@ export function createStore(): Store {
     job: undefined,
     error: undefined,
     note: undefined,
+    drawn: undefined,
     shading: 'shaded',
     source: 'computed',
     backs: false,

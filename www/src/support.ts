@@ -9,8 +9,8 @@ export async function missing(): Promise<string | undefined> {
   if (typeof WebAssembly === 'undefined') {
     return 'This page computes with WebAssembly, which this browser does not have, or which is switched off.';
   }
-  if (!(await features()).simd) {
-    return 'This page needs WebAssembly SIMD: Chrome or Edge from 91, Firefox from 89, Safari from 16.4.';
+  if (!(await features()).simd || !('throwIfAborted' in AbortSignal.prototype)) {
+    return 'This page needs a newer browser: Chrome or Edge from 100, Firefox from 114, Safari from 16.4.';
   }
   return undefined;
 }

@@ -329,6 +329,9 @@ export function createViewer(canvas: HTMLCanvasElement, { edges = true, onPart }
     // Five degrees for a press of a key, whatever the size of the window.
     controls.keyRotateSpeed = height / 72;
     reframe();
+    // Before the browser paints: a canvas of another size is empty.
+    cancelAnimationFrame(frame);
+    draw(performance.now());
   }
 
   function reframe(): void {
