@@ -7,7 +7,7 @@ const vectorModule = [
 
 /** What this engine and this page allow. In a worker it answers for the worker. */
 export function detect(): Features {
-  const simd = WebAssembly.validate(new Uint8Array(vectorModule));
+  const simd = !!globalThis.WebAssembly?.validate(new Uint8Array(vectorModule));
   // Node has no such flag, because it needs none.
   const isolated = globalThis.crossOriginIsolated ?? typeof SharedArrayBuffer === 'function';
   let reason: string | undefined;
