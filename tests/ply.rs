@@ -425,6 +425,9 @@ fn a_file_larger_than_memory_is_read_or_refused() {
         }
         other => panic!("{other:?}"),
     }
+    // What comes beyond the end is none of it.
+    let mut stream = Stream::new(10, ReadOptions::default());
+    assert!(matches!(stream.take(&beginning, &Progress::silent()), Err(Error::Format { .. })));
     // Other files are told by their beginning, not by what they would take.
     let mut stream = Stream::new(1 << 60, ReadOptions::default());
     assert!(matches!(stream.take(b"LASF", &Progress::silent()), Err(Error::Format { .. })));
@@ -717,14 +720,14 @@ fn files_without_positions_say_what_they_have() {
     let twice = file(TEXT, 1, &["float x", "float y", "float z", "float y"], b"1 2 3 4");
     assert_refused(twice, None, "y of element vertex is declared twice");
     let packed = file(LITTLE, 1, &["uint packed_position", "uint packed_color"], &[0; 8]);
-    assert_refused(packed, None, "its positions are packed");
+    assert_refused(packed, None, "with packed positions; save it uncompressed");
 }
 
 #[test]
 fn wrong_headers_say_the_line() {
     let cases: [(&str, u64, &str); 16] = [
-        ("ply\n", 1, "end_header is missing"),
-        ("ply\nformat ascii 1.0\nelement vertex 1\n", 3, "end_header is missing"),
+        ("ply\n", 1, "no end_header"),
+        ("ply\nformat ascii 1.0\nelement vertex 1\n", 3, "no end_header"),
         ("ply\nend_header\n", 2, "no format line"),
         ("ply\nformat ascii\n", 2, "'format ascii'; wanted ascii, binary"),
         (

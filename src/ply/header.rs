@@ -111,7 +111,7 @@ impl<'a> Header<'a> {
         while let Some(text) = lines.next() {
             let number = lines.number;
             if lines.at - start > HEADER_BYTES_MAX {
-                return wrong(number, message!["the header has no end_header within 16 MiB"]);
+                return wrong(number, message!["no end_header within 16 MiB"]);
             }
             let mut words = text;
             let kind = match word(&mut words) {
@@ -167,7 +167,7 @@ impl<'a> Header<'a> {
             };
             header.lines.push(Line { text, kind });
         }
-        wrong(lines.number, message!["the file ends within the header; end_header is missing"])
+        wrong(lines.number, message!["the file ends within the header; no end_header"])
     }
 
     /// The header, if all of it is in this beginning of a longer file.
@@ -205,10 +205,7 @@ impl<'a> Header<'a> {
         if vertex.properties.iter().any(|property| property.name == b"packed_position") {
             return Error::format(
                 None,
-                message![
-                    "a compressed Gaussian splat file: its positions are packed, which is not supported; save it as an \
-                     uncompressed splat PLY first"
-                ],
+                message!["a Gaussian splat file with packed positions; save it uncompressed first"],
             );
         }
         Error::format(None, message!["no x y z as plain numbers; the file has ", self.describe()])
@@ -345,14 +342,13 @@ fn line_end(file: &[u8], start: usize) -> u8 {
 #[optimize(size)]
 fn foreign(file: &[u8]) -> Error {
     const UNPACK: &str = "; unpack it first";
-    const UTF_16: (&str, &str) = ("text in UTF-16", "; save it as plain ASCII or UTF-8");
-    const PAGE: (&str, &str) = ("a web page", ", not the file itself; the download went wrong");
-    const KNOWN: [(&[u8], (&str, &str)); 17] = [
+    const UTF_16: (&str, &str) = ("text in UTF-16", "; save it as ASCII or UTF-8");
+    const PAGE: (&str, &str) = ("a web page", "; the download went wrong");
+    const KNOWN: [(&[u8], (&str, &str)); 15] = [
         (b"\x1f\x8b", ("a gzip file", UNPACK)),
         (b"PK\x03\x04", ("a zip file", UNPACK)),
         (b"BZh", ("a bzip2 file", UNPACK)),
         (b"\xfd7zXZ\0", ("an xz file", UNPACK)),
-        (b"\x28\xb5\x2f\xfd", ("a zstd file", UNPACK)),
         (b"\xff\xfe", UTF_16),
         (b"\xfe\xff", UTF_16),
         (b"p\0l\0y\0", UTF_16),
@@ -361,8 +357,7 @@ fn foreign(file: &[u8]) -> Error {
         (b"LASF", ("a LAS or LAZ file", "")),
         (b"ASTM-E57", ("an E57 file", "")),
         (b"glTF", ("a binary glTF file", "")),
-        (b"OFF", ("an OFF file", "")),
-        (b"version https://git-lfs", ("a Git LFS pointer", "; fetch the file with git lfs pull")),
+        (b"version https://git-lfs", ("a Git LFS pointer", "; fetch it with git lfs pull")),
         (b"<!", PAGE),
         (b"<html", PAGE),
     ];

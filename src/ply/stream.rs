@@ -74,6 +74,7 @@ impl Stream {
     /// Those of [`read`]. Nothing can be taken after an error, nor after the cloud.
     #[optimize(size)]
     pub fn take(&mut self, piece: &[u8], progress: &Progress) -> Result<Next, Error> {
+        let piece = &piece[..piece.len().min(usize::try_from(self.length).unwrap_or(usize::MAX))];
         // Put back when all went well: rows that were given up half-way must not count as read.
         let all = match std::mem::replace(&mut self.state, State::Beginning) {
             State::Beginning if piece.len() as u64 == self.length => read(piece, &self.options, progress)?,
