@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::lanes::load;
 use crate::lists::{fitted, reserve};
 use crate::message::message;
-use crate::order::{from_ordinal, ordinal, sort};
+use crate::order::{from_ordinal, ordinal, sort, sort_unique};
 use crate::parallel;
 use crate::power::{exp2, log2};
 use bytemuck::cast_slice;
@@ -214,12 +214,15 @@ impl Bulk {
     #[optimize(size)]
     pub fn of(count: usize, at: &dyn Fn(usize) -> DVec3) -> Self {
         let sample: Vec<DVec3> = spread(count, SAMPLE).map(at).filter(|p| p.is_finite() && *p != DVec3::ZERO).collect();
+        // Relative to an origin such marks lie elsewhere, but all in one place, which counts once.
+        let mut places: Vec<[i64; 3]> = sample.iter().map(|p| p.to_array().map(ordinal)).collect();
+        sort_unique(&mut places);
         let mut bulk = Self { median: DVec3::ZERO, extent: 0.0, core: 0.0, sample };
         if bulk.sample.is_empty() {
             return bulk;
         }
         for axis in 0..3 {
-            let mut values: Vec<i64> = bulk.sample.iter().map(|p| ordinal(p[axis])).collect();
+            let mut values: Vec<i64> = places.iter().map(|place| place[axis]).collect();
             sort(&mut values);
             let quantile = |q: f64| from_ordinal(values[((values.len() - 1) as f64 * q + 0.5) as usize]);
             let [lowest, low, median, high, highest] = [0.05, 0.25, 0.5, 0.75, 0.95].map(quantile);

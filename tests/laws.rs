@@ -409,6 +409,20 @@ fn marks_for_missing_echoes_change_nothing_noticeable() {
     }
 }
 
+/// So also where they are most of a survey: relative to its origin they lie far off, in one place.
+#[test]
+fn marks_cost_a_survey_no_precision() {
+    let cloud = sphere(40_000, 18);
+    let place = [431_000.0, 5_412_000.0, 120.0];
+    let survey: Vec<f64> = cloud.points.iter().zip(place.iter().cycle()).map(|(&c, o)| f64::from(c) + o).collect();
+    for (mark, count) in [(0.0, 45_000), (-9999.0, 120_000)] {
+        let marked = [survey.clone(), vec![mark; 3 * count]].concat();
+        let result = estimate(&Points::from_f64(&marked).unwrap(), &Options::default(), &Progress::silent()).unwrap();
+        let error = root_mean_square(&angles(&result.normals[..120_000], &cloud.normals));
+        assert!(error < 0.1, "{count} at {mark}: {error} degrees");
+    }
+}
+
 /// Also if the list has room for more, which is given back first.
 #[test]
 fn points_given_away_get_the_same_normals() {

@@ -1210,6 +1210,34 @@ fn strays_turn_nothing() {
     }
 }
 
+/// Scanners write `0 0 0` for what gave no echo: in the file's coordinates that may be amid a room or far off.
+#[test]
+fn marks_for_missing_echoes_turn_nothing() {
+    for place in [[0.0; 3], [3.0, -2.0, 1.5], [20.0, 30.0, 5.0], [431_000.0, 5_412_000.0, 120.0]] {
+        for marks in [0.01, 0.05, 0.3, 0.55] {
+            let mut random = Random(66);
+            let from = [0.2, 0.1, 0.3];
+            let (mut coordinates, mut truth) = (Vec::new(), Vec::new());
+            while truth.len() < 40_000 {
+                if random.unit() < marks {
+                    coordinates.extend([0.0; 3]);
+                } else {
+                    let (position, normal) = first_in_a_room(from, random.direction());
+                    coordinates.extend((0..3).map(|axis| position[axis] + place[axis]));
+                    truth.push((coordinates.len() / 3 - 1, normal));
+                }
+            }
+            let options = Options { orient: Orient::Consistent, ..Options::default() };
+            let result = run_with(&Points::from_f64(&coordinates).unwrap(), &options);
+            let is_right = |&&(point, normal): &&(usize, [f64; 3])| {
+                (0..3).map(|axis| f64::from(result.normals[3 * point + axis]) * normal[axis]).sum::<f64>() > 0.0
+            };
+            let right = truth.iter().filter(is_right).count() as f64 / truth.len() as f64;
+            assert!(right > 0.999, "{marks} at {place:?}: {right}, {:?}", components(&result)[0]);
+        }
+    }
+}
+
 /// As dense as they are, cubes would be so large that both sides of the wall are in one.
 #[test]
 fn strays_all_round_thin_walls_turn_nothing() {

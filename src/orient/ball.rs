@@ -22,11 +22,12 @@ pub(super) struct Ball {
 
 impl Ball {
     /// That of a cloud, by ranks: whatever a few points do, it holds the others and is no larger than twice what they take. Some
-    /// passes over the bricks.
-    pub fn of(grid: &Grid) -> Self {
-        let bricks = || grid.bricks.places.iter().zip(grid.first_point.windows(2));
-        let points = |range: &[u32]| (range[1] - range[0]) as usize;
-        let all = bricks().map(|(_, range)| points(range)).sum::<usize>();
+    /// passes over the cubes, whose points are those of `distinct`.
+    pub fn of(grid: &Grid, distinct: &[u32]) -> Self {
+        let bricks = || grid.bricks.places.iter().zip(grid.first_cube.windows(2));
+        let points =
+            |range: &[u32]| distinct[range[0] as usize..range[1] as usize].iter().map(|&points| points as usize).sum();
+        let all: usize = bricks().map(|(_, range)| points(range)).sum();
         let median = |axis: usize| {
             // No place is negative.
             ranked_runs(bricks().map(|(place, range)| (place[axis] as u32, points(range))), all / 2) as i32
@@ -61,6 +62,7 @@ impl Ball {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::Placed;
     use crate::lattice::{CUBES, Lattice};
     use crate::points::{Bounds, Points};
     use crate::progress::Progress;
@@ -75,8 +77,9 @@ mod tests {
         let lattice = Lattice::new(&Bounds::of(&points), &|| DVec3::ZERO, 1.0, CUBES);
         let stage = Progress::silent();
         let stage = stage.stage("test", 0.0..1.0);
-        let (grid, _) = Grid::sort(&Source::new(&points, lattice), &stage, |_, _| ()).unwrap();
-        let ball = Ball::of(&grid);
+        let count = |points: &[Placed], _| points.len() as u32;
+        let (grid, points) = Grid::sort(&Source::new(&points, lattice), &stage, count).unwrap();
+        let ball = Ball::of(&grid, &points);
         (grid, ball)
     }
 

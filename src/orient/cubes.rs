@@ -5,11 +5,15 @@ use crate::cell::Density;
 use crate::error::Error;
 use crate::grid::{Grid, Placed};
 use crate::lattice::{BRICK, CUBES, Lattice};
+use crate::lists::grow;
 use crate::median::{self, median};
 use crate::points::{Bounds, Points, spread};
 use crate::progress::Stage;
 use crate::source::Source;
 use glam::Vec3;
+
+/// What errors call the memory of all this.
+const WHAT: &str = "the cubes";
 
 /// Points in a cube: as many as tell noise from a wall.
 const POINTS_PER_CELL: f64 = 16.0;
@@ -22,6 +26,9 @@ const LARGEST: f32 = ENLARGEMENT * ENLARGEMENT * ENLARGEMENT;
 /// The points in their cubes.
 pub(super) struct Cubes {
     pub grid: Grid,
+    /// For each cube its points, but those that coincide with the one before them: marks for missing echoes, all in one place,
+    /// tell nothing of where the cloud lies.
+    pub distinct: Vec<u32>,
     /// The edge of a cube, in units of the positions.
     pub edge: f64,
     /// How far points lie off their surface, in edges.
@@ -38,29 +45,34 @@ pub(super) fn sort(
 ) -> Result<Cubes, Error> {
     let sort = |edge: f64, stage: &Stage| {
         let lattice = Lattice::new(bounds, &|| density.middle, edge, CUBES);
-        Ok(Grid::sort(&Source::new(points, lattice), stage, |_, _| ())?.0)
+        Grid::sort(&Source::new(points, lattice), stage, |points, _| distinct(points))
     };
     let edge = density.edge(POINTS_PER_CELL);
-    let grid = sort(edge, &stage.part(0.0..0.5))?;
-    let found = noise(&grid, normals, 1.0);
+    let (grid, distinct) = sort(edge, &stage.part(0.0..0.5))?;
+    let found = noise(&grid, normals, 1.0)?;
     if found <= LARGEST_NOISE {
-        return Ok(Cubes { grid, edge, noise: found });
+        return Ok(Cubes { grid, distinct, edge, noise: found });
     }
     let mut scale = ENLARGEMENT;
     // The largest are taken whatever their noise.
-    while scale < LARGEST && noise(&grid, normals, scale) > LARGEST_NOISE {
+    while scale < LARGEST && noise(&grid, normals, scale)? > LARGEST_NOISE {
         scale *= ENLARGEMENT;
     }
-    drop(grid);
+    drop((grid, distinct));
     let edge = f64::from(scale) * edge;
-    let grid = sort(edge, &stage.part(0.5..1.0))?;
-    let noise = noise(&grid, normals, 1.0);
-    Ok(Cubes { grid, edge, noise })
+    let (grid, distinct) = sort(edge, &stage.part(0.5..1.0))?;
+    let noise = noise(&grid, normals, 1.0)?;
+    Ok(Cubes { grid, distinct, edge, noise })
+}
+
+/// How many points of a cube do not coincide with the one before them.
+fn distinct(points: &[Placed]) -> u32 {
+    1 + points.windows(2).filter(|two| two[0].local != two[1].local).count() as u32
 }
 
 /// How far points lie off their surface, in edges: the deviation that half of some cubes do not exceed. The cubes are those of
 /// some bricks, or `scale` times as large, as many as fit into a brick.
-fn noise(grid: &Grid, normals: &[Vec3], scale: f32) -> f32 {
+fn noise(grid: &Grid, normals: &[Vec3], scale: f32) -> Result<f32, Error> {
     /// Bricks to look at: their cubes are enough for a median.
     const BRICKS: usize = 64;
     let along = (BRICK as f32 / scale) as usize;
@@ -70,13 +82,19 @@ fn noise(grid: &Grid, normals: &[Vec3], scale: f32) -> f32 {
         for point in &grid.placed[grid.first_point[brick] as usize..grid.first_point[brick + 1] as usize] {
             let [x, y, z] = (point.local / scale).to_array().map(|c| c as usize);
             if x.max(y).max(z) < along {
-                cubes[x + along * (y + along * z)].push(*point);
+                let points = &mut cubes[x + along * (y + along * z)];
+                grow(points, 1, WHAT)?;
+                points.push(*point);
             }
         }
-        deviations.extend(cubes.iter().filter_map(|points| deviation(points, normals, &mut gaps)));
+        for points in &cubes {
+            gaps.clear();
+            grow(&mut gaps, points.len(), WHAT)?;
+            deviations.extend(deviation(points, normals, &mut gaps));
+        }
     }
     // In edges of the cubes looked at.
-    median(&deviations) / scale
+    Ok(median(&deviations) / scale)
 }
 
 /// Fewer points lie on a plane in any case.
@@ -86,6 +104,7 @@ const LEAST: usize = 4;
 /// because across the faces of an edge all normals together have no direction.
 ///
 /// From how far apart points are along the normal, one next to the other: both sides of a thin wall in one cube are no noise.
+/// There is room for all in `gaps`, which are none.
 fn deviation(points: &[Placed], normals: &[Vec3], gaps: &mut Vec<f32>) -> Option<f32> {
     if points.len() < LEAST {
         return None;
@@ -94,7 +113,6 @@ fn deviation(points: &[Placed], normals: &[Vec3], gaps: &mut Vec<f32>) -> Option
     let most = most_alike(points.iter().map(own));
     let chosen = || points.iter().filter(|point| most.is_none_or(|most| are_alike(most, own(point))));
     let normal = chosen().fold(Vec3::ZERO, |sum, point| sum + aligned(own(point), sum)).try_normalize()?;
-    gaps.clear();
     gaps.extend(chosen().map(|point| point.local.dot(normal)));
     Some(median::deviation(gaps))
 }

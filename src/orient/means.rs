@@ -68,7 +68,7 @@ const FAR: f32 = 1e6;
 /// the octants of cubes within an edge, and where these contradict it at the points there.
 pub(super) fn average(
     points: &Points,
-    Cubes { grid, edge, noise }: &Cubes,
+    Cubes { grid, edge, noise, .. }: &Cubes,
     (patches, members): (&Patches, &Members),
     signs: &Signs,
     normals: &mut [Vec3],

@@ -127,18 +127,18 @@ fn surfaces(
     stage: &Stage,
 ) -> Result<Surfaces, Error> {
     let mut cubes = cubes::sort(points, normals, bounds, density, &stage.part(0.0..0.35))?;
-    let Cubes { grid, noise, .. } = &mut cubes;
-    let (patches, members) = Patches::of(grid, normals, *noise, &stage.part(0.35..0.5))?;
+    let (patches, members) = Patches::of(&cubes.grid, normals, cubes.noise, &stage.part(0.35..0.5))?;
     // Half of all the memory, and only its order is needed from here on.
-    grid.placed = Vec::new();
-    let ball = Ball::of(grid);
+    cubes.grid.placed = Vec::new();
+    let Cubes { grid, distinct, noise, .. } = &cubes;
+    let ball = Ball::of(grid, distinct);
     let sights = air::sights(&ball, grid, &patches, points.len(), &stage.part(0.5..0.55))?;
     let (links, walls) = Links::of(grid, &patches, *noise, &stage.part(0.55..0.7))?;
     let groups = Groups::of(links, &sights, &patches, &stage.part(0.7..0.8))?;
     let choosing = stage.part(0.8..0.9);
     let (choice, looks, scanner) = match options.orient {
         Orient::Outward => (outward((groups, walls), &patches, &sights, &choosing)?, None, None),
-        _ => consistent((groups, walls), &ball, grid, &patches, *noise, &sights, &choosing)?,
+        _ => consistent((groups, walls), &ball, &cubes, &patches, &sights, &choosing)?,
     };
     let (mut signs, links) = choice.into_signs();
     let mut decisions = decide(grid, &patches, &sights, links.as_ref(), &mut signs)?;
@@ -193,19 +193,19 @@ fn outward(
 fn consistent(
     (groups, walls): (Groups, Vec<Pair>),
     ball: &Ball,
-    grid: &Grid,
+    cubes: &Cubes,
     patches: &Patches,
-    noise: f32,
     sights: &Sights,
     stage: &Stage,
 ) -> Result<(Choice, Option<Looks>, Option<Scanner>), Error> {
+    let (grid, noise) = (&cubes.grid, cubes.noise);
     let mut choice = Choice::of(groups, walls, patches, sights, &stage.part(0.0..0.6))?;
     let mut looks = None;
     if choice.is_any_open() {
         looks = Some(Looks::from_the_open(grid, patches, sights)?);
         choice.trust_links(&stage.part(0.6..0.65))?;
     }
-    let scanner = match Station::of(ball, grid, patches, choice.signs(), choice.is_all_closed())? {
+    let scanner = match Station::of(ball, cubes, patches, choice.signs(), choice.is_all_closed())? {
         Some(station) => Some(Scanner::At(station)),
         None => view(&mut choice, (ball, grid, patches), noise, sights, &stage.part(0.65..0.8))?.map(Scanner::Towards),
     };

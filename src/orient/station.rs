@@ -2,6 +2,7 @@
 
 use super::ball::Ball;
 use super::components::{Decision, Side};
+use super::cubes::Cubes;
 use super::patches::{Patch, Patches, signed};
 use super::place::{FACING, Place, explained, explained_by_normals, growth, thinning};
 use super::signs::Signs;
@@ -91,7 +92,7 @@ impl Station {
     /// fit best.
     pub fn of(
         ball: &Ball,
-        grid: &Grid,
+        Cubes { grid, distinct, .. }: &Cubes,
         patches: &Patches,
         signs: &Signs,
         is_closed: bool,
@@ -100,7 +101,7 @@ impl Station {
         if spots.len() < LEAST_SPOTS {
             return Ok(None);
         }
-        let middle = middle(ball, grid);
+        let middle = middle(ball, grid, distinct);
         let about = thinning(&spots, middle, 0.0);
         // NaN, where nothing tells them, is not.
         let may_be_amid = about.near >= LEAST_NEAR && about.explained >= LEAST_EXPLAINED;
@@ -194,10 +195,10 @@ impl Candidate {
 }
 
 /// Near the scanner, if it is a scan: of points at the same angles from each other the mean, where the near ones count more.
-fn middle(ball: &Ball, grid: &Grid) -> DVec3 {
+fn middle(ball: &Ball, grid: &Grid, distinct: &[u32]) -> DVec3 {
     let (mut sum, mut all) = (DVec3::ZERO, 0.0);
     for (place, cube, _) in ball.bricks(grid).flat_map(|brick| grid.centres_of(brick)) {
-        let points = grid.points_of(cube).len() as f64;
+        let points = f64::from(distinct[cube]);
         let weight = points * points.sqrt();
         sum += weight * place;
         all += weight;
