@@ -173,15 +173,8 @@ impl<'a> Cursor<'a> {
         if !self.is_text() {
             return Ok(bits(value, self.is_big_endian()));
         }
-        text_bits(value, scalar).ok_or_else(|| {
-            self.error(message![
-                "'",
-                shorten(value),
-                "' is no value of type ",
-                scalar.name(),
-                "; the output can keep it only as ASCII"
-            ])
-        })
+        text_bits(value, scalar)
+            .ok_or_else(|| self.error(message!["'", shorten(value), "' is no value of type ", scalar.name()]))
     }
 
     /// The next value of the line as it is written, or none at the end of the line.

@@ -296,19 +296,29 @@ impl Rows<'_> {
                 sink.line(cursor.whole_line())?;
                 continue;
             }
-            for step in self.steps {
-                match step.kind {
-                    Some(kind) if step.put == Step::KEEP => self.translate_property(&mut cursor, kind, sink)?,
-                    Some(kind) => cursor.skip(kind, self.element)?,
-                    None => {}
+            self.translate_row(&mut cursor, point, sink).map_err(|error| match error {
+                Error::Format { message, place } if cursor.is_text() && !sink.text => {
+                    Error::format(place, message![message, "; the output can keep it only as ASCII"])
                 }
-                if step.put < Step::KEEP {
-                    sink.float(self.add.value(step.put, point))?;
-                }
-            }
-            cursor.end_row(self.element)?;
-            sink.end_row();
+                other => other,
+            })?;
         }
+        Ok(())
+    }
+
+    fn translate_row(&self, cursor: &mut Cursor, point: usize, sink: &mut Sink) -> Result<(), Error> {
+        for step in self.steps {
+            match step.kind {
+                Some(kind) if step.put == Step::KEEP => self.translate_property(cursor, kind, sink)?,
+                Some(kind) => cursor.skip(kind, self.element)?,
+                None => {}
+            }
+            if step.put < Step::KEEP {
+                sink.float(self.add.value(step.put, point))?;
+            }
+        }
+        cursor.end_row(self.element)?;
+        sink.end_row();
         Ok(())
     }
 
