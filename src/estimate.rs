@@ -48,7 +48,7 @@ pub struct Report {
     pub nodes: u64,
     /// Cubes along each axis of the bounding box, at most 2^30; with [`Cell::Auto`] along axes of the cloud's own, at most 2^22.
     pub grid: [u64; 3],
-    /// Edge of a cube, in units of the input.
+    /// Edge of a cube, in units of the input: no more than twice the longest side of the cloud, because larger cubes hold the same.
     pub cell_size: f64,
     /// Edge of a cube, in multiples of the paper's L (Eq. 1).
     pub scale: f64,

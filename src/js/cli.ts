@@ -138,8 +138,8 @@ function parseOrient(value: string): Task['orient'] {
 
 /** Reads, estimates, writes. Errors name the file they belong to. */
 async function run(task: Task): Promise<Report> {
-  const source = await about(task.input, () => openInput(task.input));
   await about(task.output, () => checkOutput(task.output));
+  const source = await about(task.input, () => openInput(task.input));
   let estimator = await usage(() => createEstimator({ threads: task.threads }));
   const show = task.quiet || !process.stderr.isTTY ? undefined : showProgress;
   try {

@@ -45,12 +45,11 @@ async function targetOf(path: string, most = 40): Promise<string> {
 /** Under a temporary name beside `path`, then renamed: nobody ever sees half a file. Packed, if it is to be a .gz. */
 export async function writeOutput(path: string, contents: Blob): Promise<void> {
   const packed = /\.gz$/i.test(path) ? await through(Readable.from(piecesOf(contents)), createGzip()) : contents;
-  const target = await targetOf(path);
-  // It keeps its permissions.
-  const existing = await stat(target).catch(() => undefined);
+  const existing = await stat(path).catch(() => undefined);
   // A device or a pipe is written to, never replaced.
-  if (existing && !existing.isFile()) return writePieces(await open(target, 'w'), packed);
+  if (existing && !existing.isFile()) return writePieces(await open(path, 'w'), packed);
 
+  const target = await targetOf(path);
   const temporary = join(dirname(target), `.bilinormal-${randomBytes(4).toString('hex')}`);
   const remove = () => rmSync(temporary, { force: true });
   const interrupted = (signal: NodeJS.Signals) => {
@@ -63,6 +62,7 @@ export async function writeOutput(path: string, contents: Blob): Promise<void> {
   for (const signal of signals) process.on(signal, interrupted);
   try {
     const file = await open(temporary, 'wx');
+    // It keeps its permissions.
     if (existing) await file.chmod(existing.mode);
     await writePieces(file, packed);
     await rename(temporary, target);
@@ -105,7 +105,8 @@ async function unpacked(file: Readable): Promise<Blob> {
   try {
     return await through(file, createGunzip());
   } catch (error) {
-    throw new Error(`packed with gzip, and damaged: ${plain(error)}`);
+    const isOfZlib = /^Z_/.test((error as NodeJS.ErrnoException).code ?? '');
+    throw isOfZlib ? new Error(`packed with gzip, and damaged: ${plain(error)}`) : error;
   }
 }
 

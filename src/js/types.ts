@@ -104,7 +104,10 @@ export interface Report {
   nodes: number;
   /** Cubes along each axis, at most 2^30; with `cell: 'auto'` along axes of the cloud's own, at most 2^22. */
   grid: [number, number, number];
-  /** Edge of the cubes in the units of the input; with `cell: 'auto'`, of those that it begins with. */
+  /**
+   * Edge of the cubes in the units of the input, at most twice the longest side of the cloud, because larger ones hold the
+   * same; with `cell: 'auto'`, of those that it begins with.
+   */
   cellSize: number;
   /** Edge of the cubes in multiples of the paper's L. */
   scale: number;

@@ -104,7 +104,7 @@ const LEAST: usize = 4;
 /// because across the faces of an edge all normals together have no direction.
 ///
 /// From how far apart points are along the normal, one next to the other: both sides of a thin wall in one cube are no noise.
-/// There is room for all in `gaps`, which are none.
+/// `gaps` comes empty, with room for all points.
 fn deviation(points: &[Placed], normals: &[Vec3], gaps: &mut Vec<f32>) -> Option<f32> {
     if points.len() < LEAST {
         return None;

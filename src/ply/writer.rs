@@ -2,7 +2,7 @@
 
 use super::body::{Body, Part};
 use super::columns::{self, NAMES, Target};
-use super::cursor::Cursor;
+use super::cursor::{Cursor, ONLY_TEXT};
 use super::header::{Element, Header, Kind, LineKind};
 use super::scalar::Scalar;
 use super::sink::Sink;
@@ -297,8 +297,9 @@ impl Rows<'_> {
                 continue;
             }
             self.translate_row(&mut cursor, point, sink).map_err(|error| match error {
-                Error::Format { message, place } if cursor.is_text() && !sink.text => {
-                    Error::format(place, message![message, "; the output can keep it only as ASCII"])
+                // Values that their type cannot hold say so themselves.
+                Error::Format { message, place } if cursor.is_text() && self.kept && !message.ends_with(ONLY_TEXT) => {
+                    Error::format(place, message![message, ONLY_TEXT])
                 }
                 other => other,
             })?;

@@ -222,6 +222,11 @@ test('standard input and devices', { skip: process.platform === 'win32' }, () =>
   assert.equal(propertyOf(written('piped.ply'), 'vertex', 'nx').values.length, 20000);
   assert.equal(run(['sphere.ply', '-o', '/dev/null', '--quiet']).status, 0);
   assert.ok(statSync('/dev/null').isCharacterDevice());
+  // A link to a pipe.
+  const command = `"${process.execPath}" "${cli}" sphere.ply -o /dev/stdout --quiet | cat > through.ply`;
+  const { status, stderr } = spawnSync('bash', ['-c', command], { cwd: folder, encoding: 'utf8', timeout: 60000 });
+  assert.deepEqual({ status, stderr }, { status: 0, stderr: '' });
+  assert.equal(propertyOf(written('through.ply'), 'vertex', 'nx').values.length, 20000);
 });
 
 test(

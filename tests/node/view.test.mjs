@@ -1,11 +1,12 @@
 // What the page finds out about a cloud before it draws it: the modules of the page that need no browser.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
+import { fileURLToPath } from 'node:url';
 import { buildSync } from 'esbuild';
 import { sphere } from './clouds.mjs';
 
 async function load(name) {
-  const entryPoints = [new URL(`../../www/src/${name}.ts`, import.meta.url).pathname];
+  const entryPoints = [fileURLToPath(new URL(`../../www/src/${name}.ts`, import.meta.url))];
   const [{ text }] = buildSync({ entryPoints, bundle: true, write: false, format: 'esm' }).outputFiles;
   return import(`data:text/javascript,${encodeURIComponent(text)}`);
 }

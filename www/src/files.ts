@@ -1,6 +1,6 @@
 // Files that come to the page and leave it: scans from a disk, the sample, what is saved.
 import { BilinormalError, readPointCloud, type PointCloud } from 'bilinormal';
-import { damaged, foreign } from './foreign';
+import { foreign, notUnpacked } from './foreign';
 import { measure } from './format';
 import type { Step } from './jobs';
 import { isPacked, unpack } from './packed';
@@ -19,7 +19,7 @@ export async function unpacked(file: File, { signal, begin }: Step): Promise<Fil
   const reason = await foreign(file);
   if (reason) throw reason;
   return unpack(file, signal, begin(`Unpacking ${file.name}`)).catch(() => {
-    throw damaged();
+    throw notUnpacked();
   });
 }
 

@@ -4,7 +4,7 @@ import { GZIP, beginningOf } from './packed';
 const TOOLS = 'CloudCompare and MeshLab, among others, save scans as PLY.';
 const CONVERT = `Only PLY files can be opened; ${TOOLS}`;
 const UNPACK = 'Unpack it, then open the PLY file in it.';
-const DAMAGED = 'is packed with gzip, and cannot be unpacked here';
+const PACKED = 'is packed with gzip, and cannot be unpacked here';
 
 /** The first that fits counts: a name tells more than how the file is packed. */
 const KINDS: { name?: RegExp; begins?: RegExp; is: string; remedy: string }[] = [
@@ -13,7 +13,7 @@ const KINDS: { name?: RegExp; begins?: RegExp; is: string; remedy: string }[] = 
     is: 'holds Gaussian splats',
     remedy: 'Only PLY files can be opened; SuperSplat, among others, saves splats as PLY.',
   },
-  { begins: GZIP, is: DAMAGED, remedy: UNPACK },
+  { begins: GZIP, is: PACKED, remedy: UNPACK },
   { begins: /^[^]{257}ustar/, is: 'is a tar archive', remedy: UNPACK },
   { begins: /^PK\x03\x04/, is: 'is packed with zip', remedy: UNPACK },
   { begins: /^(BZh|\xfd7zXZ|\x28\xb5\x2f\xfd|7z\xbc\xaf|Rar!)/, is: 'is packed', remedy: UNPACK },
@@ -30,8 +30,8 @@ const KINDS: { name?: RegExp; begins?: RegExp; is: string; remedy: string }[] = 
 /** Why a file cannot be opened, as what follows its name. */
 export class Foreign extends Error {}
 
-/** Of a packed one that only begins as a scan does. */
-export const damaged = (): Foreign => new Foreign(`${DAMAGED}. ${UNPACK}`);
+/** Of a packed one that begins as a scan does: it is damaged further on, or there is no room for what is in it. */
+export const notUnpacked = (): Foreign => new Foreign(`${PACKED}. ${UNPACK}`);
 
 /**
  * Undefined for a file that begins as a PLY does, also once it is unpacked, and for one that cannot be read, which says so by

@@ -121,7 +121,7 @@ function tell(state: State, before: State | undefined): void {
   }
 }
 
-/** What starts a job does nothing while one runs, but keeps the focus of the keyboard. */
+/** What has to wait for a job does nothing meanwhile, but keeps the focus of the keyboard. */
 const rest = (button: HTMLElement, busy: boolean) => button.setAttribute('aria-disabled', String(busy));
 
 const radio = (name: string, value: string) => element<HTMLInputElement>(`input[name="${name}"][value="${value}"]`);

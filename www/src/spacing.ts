@@ -8,7 +8,10 @@ const NEIGHBOURS = 8;
 /** Share of the probes whose neighbours are no further: what is thinly covered does not make blobs of the rest. */
 const QUANTILE = 0.9;
 
-/** The edge of the square that a point has for itself on the surface; `Infinity` if all are in one place, or none is finite of those looked at. */
+/**
+ * The edge of the square that a point has for itself on the surface; `Infinity` if all are in one place, or none is finite of
+ * those looked at.
+ */
 export function spacingOf(positions: Float32Array): number {
   const all = positions.length / 3;
   const sample = new Float32Array(3 * Math.min(all, SAMPLE));
