@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::lattice::mixed;
 use crate::message::message;
 use crate::number;
-use crate::order::{from_ordinal, ordinal, sort, sort_unique};
+use crate::order::sort;
 use crate::parallel::{self, Gathering};
 use crate::points::{Bounds, Bulk, Points};
 use crate::power::{exp2, log2};
@@ -163,9 +163,7 @@ impl Probes {
     /// Halves the edge until the probes hold no more of the cloud than wanted.
     #[optimize(size)]
     fn place(bulk: &Bulk, extent: f64, count: usize) -> Self {
-        let mut sorted: Vec<[i64; 3]> = bulk.sample.iter().map(|p| p.to_array().map(ordinal)).collect();
-        sort_unique(&mut sorted);
-        let sample: Vec<DVec3> = sorted.into_iter().map(|p| DVec3::from_array(p.map(from_ordinal))).collect();
+        let sample = &bulk.distinct;
         let wanted = (PROBED_POINTS / count as f64).max(1.0 / 64.0);
         let step = sample.len().div_ceil(PROBES).max(1);
         let mut probes = Self { origin: bulk.median, edge: extent, scale: 0.0, chosen: Vec::new(), table: Vec::new() };

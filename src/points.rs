@@ -201,6 +201,8 @@ pub(crate) struct Bulk {
     pub core: f64,
     /// The finite points looked at.
     pub sample: Vec<DVec3>,
+    /// Their places, each once, sorted.
+    pub distinct: Vec<DVec3>,
 }
 
 impl Bulk {
@@ -217,8 +219,9 @@ impl Bulk {
         // Relative to an origin such marks lie elsewhere, but all in one place, which counts once.
         let mut places: Vec<[i64; 3]> = sample.iter().map(|p| p.to_array().map(ordinal)).collect();
         sort_unique(&mut places);
-        let mut bulk = Self { median: DVec3::ZERO, extent: 0.0, core: 0.0, sample };
-        if bulk.sample.is_empty() {
+        let distinct = places.iter().map(|place| DVec3::from_array(place.map(from_ordinal))).collect();
+        let mut bulk = Self { median: DVec3::ZERO, extent: 0.0, core: 0.0, sample, distinct };
+        if places.is_empty() {
             return bulk;
         }
         for axis in 0..3 {
