@@ -344,11 +344,12 @@ fn foreign(file: &[u8]) -> Error {
     const UNPACK: &str = "; unpack it first";
     const UTF_16: (&str, &str) = ("text in UTF-16", "; save it as ASCII or UTF-8");
     const PAGE: (&str, &str) = ("a web page", "; the download went wrong");
-    const KNOWN: [(&[u8], (&str, &str)); 15] = [
+    const KNOWN: [(&[u8], (&str, &str)); 17] = [
         (b"\x1f\x8b", ("a gzip file", UNPACK)),
         (b"PK\x03\x04", ("a zip file", UNPACK)),
         (b"BZh", ("a bzip2 file", UNPACK)),
         (b"\xfd7zXZ\0", ("an xz file", UNPACK)),
+        (b"\x28\xb5\x2f\xfd", ("a zstd file", UNPACK)),
         (b"\xff\xfe", UTF_16),
         (b"\xfe\xff", UTF_16),
         (b"p\0l\0y\0", UTF_16),
@@ -357,6 +358,7 @@ fn foreign(file: &[u8]) -> Error {
         (b"LASF", ("a LAS or LAZ file", "")),
         (b"ASTM-E57", ("an E57 file", "")),
         (b"glTF", ("a binary glTF file", "")),
+        (b"OFF", ("an OFF file", "")),
         (b"version https://git-lfs", ("a Git LFS pointer", "; fetch it with git lfs pull")),
         (b"<!", PAGE),
         (b"<html", PAGE),
