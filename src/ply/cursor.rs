@@ -7,9 +7,6 @@ use crate::error::{Error, Place};
 use crate::message::message;
 use crate::number;
 
-/// What to do where a file cannot be written as binary.
-pub(super) const ONLY_TEXT: &str = "; the output can keep it only as ASCII";
-
 /// Where the next value is. A row of text is one line; blank lines are passed over.
 #[derive(Clone)]
 pub(super) struct Cursor<'a> {
@@ -176,9 +173,8 @@ impl<'a> Cursor<'a> {
         if !self.is_text() {
             return Ok(bits(value, self.is_big_endian()));
         }
-        text_bits(value, scalar).ok_or_else(|| {
-            self.error(message!["'", shorten(value), "' is no value of type ", scalar.name(), ONLY_TEXT])
-        })
+        text_bits(value, scalar)
+            .ok_or_else(|| self.error(message!["'", shorten(value), "' is no value of type ", scalar.name()]))
     }
 
     /// The next value of the line as it is written, or none at the end of the line.

@@ -2,7 +2,7 @@
 
 use super::body::{Body, Part};
 use super::columns::{self, NAMES, Target};
-use super::cursor::{Cursor, ONLY_TEXT};
+use super::cursor::Cursor;
 use super::header::{Element, Header, Kind, LineKind};
 use super::scalar::Scalar;
 use super::sink::Sink;
@@ -296,13 +296,7 @@ impl Rows<'_> {
                 sink.line(cursor.whole_line())?;
                 continue;
             }
-            self.translate_row(&mut cursor, point, sink).map_err(|error| match error {
-                // Values that their type cannot hold say so themselves.
-                Error::Format { message, place } if cursor.is_text() && self.kept && !message.ends_with(ONLY_TEXT) => {
-                    Error::format(place, message![message, ONLY_TEXT])
-                }
-                other => other,
-            })?;
+            self.translate_row(&mut cursor, point, sink).map_err(|error| hinted(error, self.kept, &cursor))?;
         }
         Ok(())
     }
@@ -349,6 +343,18 @@ impl Rows<'_> {
             sink.append(value)?;
             return sink.append(b" ");
         }
-        sink.value(scalar, cursor.bits(value, scalar)?)
+        // Of a row that is kept, all errors get the hint.
+        let bits = cursor.bits(value, scalar).map_err(|error| hinted(error, !self.kept, cursor))?;
+        sink.value(scalar, bits)
+    }
+}
+
+/// Says of a value, or of a row that is kept, that text could have kept it.
+fn hinted(error: Error, is_kept_by_text: bool, cursor: &Cursor) -> Error {
+    match error {
+        Error::Format { message, place } if is_kept_by_text && cursor.is_text() => {
+            Error::format(place, message![message, "; the output can keep it only as ASCII"])
+        }
+        other => other,
     }
 }
