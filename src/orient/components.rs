@@ -108,6 +108,9 @@ const LEAST_BULGE: f64 = 0.12;
 /// The mean of normals that look all round is shorter.
 const ALL_ROUND: f64 = 0.5;
 
+/// Links with less evidence than this touch nothing: stray points between two noisy surfaces make many of a fiftieth.
+const LEAST_LINK: f32 = 0.05;
+
 /// Less evidence than this between a surface and those that it touches may be chance, or than so much for each patch along its side,
 /// and so may be where more than a quarter of it speaks for the other side.
 const LEAST_TOUCH: f64 = 1.0;
@@ -222,7 +225,7 @@ fn follow_touches(decided: &mut [(Decision, bool)], links: &Links, signs: &Signs
         let mut touches = filled((0.0, 0.0), decided.len(), WHAT)?;
         let is_told = |component: u32| is_told(&decided[component as usize].0);
         for (one, &own) in signs.component.iter().enumerate().filter(|&(_, &own)| !is_told(own)) {
-            for link in links.from(one) {
+            for link in links.from(one).iter().filter(|link| link.evidence.abs() >= LEAST_LINK) {
                 let (to, other) = (link.to as usize, signs.component[link.to as usize]);
                 if other != own && is_told(other) {
                     let is_against = signs.flipped[one] ^ signs.flipped[to] ^ decided[other as usize].1;
@@ -328,25 +331,28 @@ mod tests {
     /// Surfaces of one patch each, the first told by the air, with its normal inwards; of the others `volume` has their signs so far.
     #[test]
     fn a_surface_goes_by_what_it_touches() {
-        let evidence = [(0, 1, 2.0), (1, 2, -2.0), (0, 3, 3.0), (0, 3, -1.5), (0, 4, 0.9), (2, 5, -2.0)];
-        let told = evidence.map(|(from, to, evidence)| (from, Link { to, evidence }));
-        let links = Links::both_ways(6, told.into_iter()).unwrap();
+        let touches = [(0, 1, 2.0), (1, 2, -2.0), (0, 3, 3.0), (0, 3, -1.5), (0, 4, 0.9), (2, 5, -2.0)];
+        let strays = [(0, 6, -0.02); 100];
+        let told = touches.iter().chain(&strays).map(|&(from, to, evidence)| (from, Link { to, evidence }));
+        let links = Links::both_ways(7, told).unwrap();
         let signs = Signs {
-            flipped: vec![false, true, false, false, false, false],
-            component: (0..6).collect(),
-            components: 6,
+            flipped: vec![false, true, false, false, false, false, false],
+            component: (0..7).collect(),
+            components: 7,
         };
         let decided = |side| {
             let component = Component { points: 16, side, confidence: 0.0 };
             (Decision { component, patches: 1, volume: 0.2 }, side == Side::Air)
         };
-        let mut all = [Side::Air, Side::Volume, Side::Volume, Side::Volume, Side::Volume, Side::Volume].map(decided);
+        let sides = [Side::Air, Side::Volume, Side::Volume, Side::Volume, Side::Volume, Side::Volume, Side::Volume];
+        let mut all = sides.map(decided);
         follow_touches(&mut all, &links, &signs).unwrap();
-        // The fourth is contradicted, and the fifth hardly touches.
+        // The fourth is contradicted, the fifth hardly touches, and the last has strays near by.
         let sides = all.map(|(decision, _)| decision.component.side);
-        assert_eq!(sides, [Side::Air, Side::Touch, Side::Touch, Side::Volume, Side::Volume, Side::Touch]);
-        // Who agrees with the first is turned as it is, unless flipped already; the last is at odds with the third.
-        assert_eq!(all.map(|(_, is_inwards)| is_inwards), [true, false, false, false, false, true]);
-        assert_eq!(all.map(|(decision, _)| decision.volume), [0.2, 0.2, 0.2, 0.2, 0.2, -0.2]);
+        let [volume, touch] = [Side::Volume, Side::Touch];
+        assert_eq!(sides, [Side::Air, touch, touch, volume, volume, touch, volume]);
+        // Who agrees with the first is turned as it is, unless flipped already; the sixth is at odds with the third.
+        assert_eq!(all.map(|(_, is_inwards)| is_inwards), [true, false, false, false, false, true, false]);
+        assert_eq!(all.map(|(decision, _)| decision.volume), [0.2, 0.2, 0.2, 0.2, 0.2, -0.2, 0.2]);
     }
 }

@@ -33,12 +33,15 @@ const ONE_SIDED_LATER: f64 = 0.8;
 /// hollow side: with 0.1 a sixth of a pipe does, with 0.5 what one range image shows of a body.
 const HOLLOW: f64 = 0.05;
 
+/// What holds more is told only by looks that are worth this share of its patches: else a few at the back of a statue, through what
+/// was not scanned of it, turn it inside out.
+const LEAST_LOOKS: f64 = 0.04;
+
 /// The largest surface is ground to which all is joined that stands on it if it holds less than this, its own parts all but
-/// agree on its side, and their looks are worth no small share of its patches: range images of hills look at themselves from
+/// agree on its side, and their looks are worth that share of its patches: range images of hills look at themselves from
 /// both sides, and two thirds of a half pipe from behind, but little. Steps between walls hold 0.40.
 const BULGE: f64 = 0.42;
 const AGREED: f64 = 0.85;
-const LEAST_OWN: f64 = 0.04;
 
 /// What holds less is flat: only that is told by what was told before. Boxes of which two walls are missing have 0.3, and are
 /// looked at from behind through the gap.
@@ -62,11 +65,13 @@ impl Looked {
     fn count(&self, decision: &Decision, is_largest: bool, step: usize) -> Votes {
         let Self { others, own } = *self;
         let is_ground = is_largest && decision.volume.abs() < BULGE && own.agreement() > AGREED;
-        let is_clear = own.balance.abs() * step as f64 > LEAST_OWN * decision.patches as f64;
-        if decision.volume.abs() < HOLLOW || is_ground && is_clear {
+        let is_clear = |votes: &Votes| votes.balance.abs() * step as f64 > LEAST_LOOKS * decision.patches as f64;
+        if decision.volume.abs() < HOLLOW || is_ground && is_clear(&own) {
             Votes { balance: others.balance + own.balance, all: others.all + own.all }
-        } else {
+        } else if is_clear(&others) {
             others
+        } else {
+            Votes::default()
         }
     }
 }
@@ -211,5 +216,19 @@ mod tests {
         assert_eq!(balance(100, 40), 20.0);
         assert_eq!(balance(40, 40), 20.0);
         assert_eq!(balance(20, 40), 0.0, "few patches look at anything");
+    }
+
+    /// Ten looks at the back of a surface of 20,000 patches, each of which stands for five.
+    #[test]
+    fn a_few_looks_turn_nothing_that_bulges() {
+        let counted = |volume: f64, patches: u64| {
+            let component = Component { points: 0, side: Side::Volume, confidence: 0.0 };
+            let others = Votes { balance: -10.0, all: 10.0 };
+            let looked = Looked { others, own: Votes::default() };
+            looked.count(&Decision { component, patches, volume }, true, 5).balance
+        };
+        assert_eq!(counted(0.1, 20_000), 0.0);
+        assert_eq!(counted(0.1, 1_000), -10.0);
+        assert_eq!(counted(0.01, 20_000), -10.0, "a floor on which little stands");
     }
 }
