@@ -51,7 +51,9 @@ impl Sights {
     /// For each patch what speaks for its normal to point outwards: its exposure, less where it sees the open from both sides,
     /// as ground does, and where it is of few points.
     pub fn evidence(&self, patches: &Patches) -> impl Iterator<Item = f32> {
-        let share = |exposure: f32, all: f32| exposure * (exposure.abs() / all.max(f32::MIN_POSITIVE));
+        // What is left of directions along the surface is rounding, in both sums.
+        let share =
+            |exposure: f32, all: f32| exposure * (exposure.abs() / all.max(exposure.abs()).max(f32::MIN_POSITIVE));
         let sights = self.exposure.iter().zip(&self.all);
         sights.zip(&patches.all).map(move |((&exposure, &all), patch)| AIR * patch.certainty() * share(exposure, all))
     }
@@ -367,6 +369,14 @@ mod tests {
         assert_eq!(evidence[0], AIR * 0.9);
         assert!((-0.03 * AIR..0.0).contains(&evidence[1]), "{evidence:?}");
         assert_eq!(evidence[2], 0.0);
+    }
+
+    /// Directions along the surface cancel out but for rounding.
+    #[test]
+    fn what_is_seen_along_a_surface_says_nothing() {
+        let patches = Patches { all: vec![patch(Vec3::ZERO, 100)], first: vec![0, 1] };
+        let sights = Sights { exposure: vec![1e-8], all: vec![0.0] };
+        assert!(sights.evidence(&patches).all(|evidence| evidence.abs() < 1e-7));
     }
 
     #[test]
