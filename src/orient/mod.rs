@@ -216,7 +216,7 @@ fn consistent(
 }
 
 /// The view that the cloud is, if it is one: by links alone, or where these are not enough by some of the air, too. The signs are
-/// those that fit it better.
+/// by links unless the others fit clearly better.
 fn view(
     choice: &mut Choice,
     (ball, grid, patches): (&Ball, &Grid, &Patches),
@@ -230,7 +230,7 @@ fn view(
     }
     let signs_by_links = choice.be_cautious(None, sights, &stage.part(0.3..0.5))?;
     let by_air = View::of((ball, grid, patches), noise, choice.signs(), &stage.part(0.5..1.0))?;
-    if by_links.as_ref().is_some_and(|view| by_air.as_ref().is_none_or(|other| view.is_better(other))) {
+    if by_links.as_ref().is_some_and(|view| by_air.as_ref().is_none_or(|other| view.is_as_good(other))) {
         choice.exchange(signs_by_links);
         return Ok(by_links);
     }

@@ -26,6 +26,10 @@ const MOST_AWAY: f64 = 0.08;
 const ALMOST: f64 = 0.12;
 const HOPELESS: f64 = 0.3;
 
+/// A view by signs that are less likely has to fit so much better: of what was seen from two or three sides some faces away in any
+/// case, and a little less where a piece of it has the wrong sign.
+const CLEARLY_BETTER: f64 = 0.5;
+
 /// So much may be of components that were scanned all round.
 const MOST_MIXED: f64 = 0.2;
 
@@ -106,9 +110,9 @@ impl View {
         self.unfit <= ENOUGH
     }
 
-    /// Whether it fits no worse than another one.
-    pub fn is_better(&self, other: &Self) -> bool {
-        self.unfit <= other.unfit
+    /// Whether another one does not fit clearly better.
+    pub fn is_as_good(&self, other: &Self) -> bool {
+        CLEARLY_BETTER * self.unfit <= other.unfit
     }
 
     /// Turns all surfaces to the scanner, at that end of the view where it was. Where nothing tells that, the mean of all normals
