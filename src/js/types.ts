@@ -124,17 +124,18 @@ export interface Report {
   /** Points interpolated from 0, 1, 2, 3 and 4 nodes; all from 0 for the baselines and with `cell: 'auto'`. */
   nodesUsed: [number, number, number, number, number];
   /**
-   * The surfaces that were given one sign each: how many there are, and at most the thousand largest, the largest first.
-   * `side` tells by what: `'air'`, because the surface is closed, and one side sees much more of the open air; `'volume'`,
-   * away from the middle of what is open or hidden, or, of what is long and thin, from the middles of its pieces;
-   * `'touch'`, as a surface that it touches and that the air told, or that was told so; `'sight'`, because other surfaces,
-   * or its own parts, stand before that side; `'view'`, because the cloud is what a scanner saw from that side or from amid
-   * the surfaces (both by `'consistent'` only); `'convention'`, because it is open and flat, so that nothing tells: the
-   * mean normal has `x + 2y + 4z >= 0`, where all was seen from one side that of all surfaces. `confidence`, from 0, a
-   * guess, to 1, which is sure: of all that is seen of the open, how much more is seen from one side; for what sees nothing
-   * of it how much volume there is, of that of a sphere, or of its pieces; by touch, half of how much more evidence speaks
-   * for that side, of all and of what is needed; by sight, half of how much more looks at that side, of all that does; by
-   * view, up to a half, or from amid the surfaces how well their densities tell where it was.
+   * The surfaces that were given one sign each: how many there are, and at most the thousand largest, the largest
+   * first. `side` tells by what: `'air'`, because the surface is closed, and one side sees much more of the open air;
+   * `'volume'`, away from the middle of what is open or hidden, or, of what is long and thin, from the middles of its
+   * pieces; `'touch'`, as a surface that it touches and that the air told, or that was told so; `'sight'`, because
+   * other surfaces, or its own parts, stand before that side; `'view'`, because the cloud is what a scanner saw from
+   * that side, or one or a few from amid the surfaces (both by `'consistent'` only); `'convention'`, because it is
+   * open and flat, so that nothing tells: the mean normal has `x + 2y + 4z >= 0`, where all was seen from one side
+   * that of all surfaces. `confidence`, from 0, a guess, to 1, which is sure: of all that is seen of the open, how
+   * much more is seen from one side; for what sees nothing of it how much volume there is, of that of a sphere, or of
+   * its pieces; by touch, half of how much more evidence speaks for that side, of all and of what is needed; by sight,
+   * half of how much more looks at that side, of all that does; by view, up to a half, or from amid the surfaces how
+   * well their densities tell where scanners stood.
    * Only with `orient: 'consistent'` and `'outward'`.
    */
   components?: {

@@ -58,7 +58,7 @@ pub enum Side {
     Touch,
     /// What stands before it: it is looked at from one side.
     Sight,
-    /// The scanner: all of the cloud was seen from one side, or from amid it.
+    /// The scanner: all of the cloud was seen from one side, or by one or a few from amid it.
     View,
     /// Nothing: the surface is open and flat. By convention `x + 2y + 4z >= 0` for its mean normal; where all was seen from one
     /// side for that of all.

@@ -28,6 +28,7 @@ mod signs;
 mod specks;
 mod spots;
 mod station;
+mod stations;
 mod support;
 mod thinning;
 mod view;
@@ -53,7 +54,9 @@ use links::{Links, Pair};
 use looks::Looks;
 use patches::{Members, Patches};
 use signs::{Choice, Signs};
+use spots::spots;
 use station::Station;
+use stations::Stations;
 use view::View;
 
 /// What was found out about the surfaces of a cloud.
@@ -145,6 +148,7 @@ fn surfaces(
     drop(links);
     match scanner {
         Some(Scanner::At(station)) => station.turn_to_it(grid, &patches, &mut signs, &mut decisions)?,
+        Some(Scanner::Amid(stations)) => stations.turn_to_them(grid, &patches, &mut signs, &mut decisions)?,
         Some(Scanner::Towards(view)) => {
             view.turn_to_it((&ball, grid, &patches), looks.as_ref(), &mut signs, &mut decisions)?
         }
@@ -165,10 +169,12 @@ fn surfaces(
     Ok(Surfaces { components, of_point })
 }
 
-/// Where the one scanner was that saw all.
+/// Where the scanner was that saw all, or several.
 enum Scanner {
     /// In this place.
     At(Station),
+    /// In these places.
+    Amid(Stations),
     /// In this direction.
     Towards(View),
 }
@@ -205,10 +211,15 @@ fn consistent(
         looks = Some(Looks::from_the_open(grid, patches, sights)?);
         choice.trust_links(&stage.part(0.6..0.65))?;
     }
-    let scanner = match Station::of(ball, cubes, patches, choice.signs(), choice.is_all_closed())? {
-        Some(station) => Some(Scanner::At(station)),
-        None => view(&mut choice, (ball, grid, patches), noise, sights, &stage.part(0.65..0.8))?.map(Scanner::Towards),
-    };
+    let spots = spots(ball, grid, patches, "the scanners")?;
+    let scanner =
+        if let Some(station) = Station::of(&spots, ball, cubes, patches, choice.signs(), choice.is_all_closed())? {
+            Some(Scanner::At(station))
+        } else if let Some(stations) = Stations::of(&spots, grid, patches, sights, choice.signs())? {
+            Some(Scanner::Amid(stations))
+        } else {
+            view(&mut choice, (ball, grid, patches), noise, sights, &stage.part(0.65..0.8))?.map(Scanner::Towards)
+        };
     if looks.is_some() && scanner.is_none() {
         choice.be_cautious(looks.as_ref(), sights, &stage.part(0.8..1.0))?;
     }

@@ -3,9 +3,9 @@
 //! It sends its rays in all directions alike: of a surface that is twice as far it takes a quarter as many points, and fewer of
 //! what is slanted, by the cosine.
 
-use super::spots::Spot;
+use super::spots::{Spot, variance};
 use super::thinning::Thinning;
-use crate::power::log2;
+use crate::power::{exp2, log2};
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
 /// What is seen at a flatter angle, by its cosine, tells no density: for the law it does not count, and where a place is sought,
@@ -24,9 +24,13 @@ const BESIDE: f64 = 1.5;
 /// Steps of the search, unless one changes the misfit by less than such a share; and how long they may be, in the same distances.
 const ROUNDS: usize = 15;
 const ENOUGH: f64 = 1e-3;
-const LONGEST: f64 = 0.3;
+pub(super) const LONGEST: f64 = 0.3;
+
+/// Steps to the level that fits most of the spots, by the same weights.
+const LEVELLINGS: usize = 3;
 
 /// A place for a scanner.
+#[derive(Clone, Copy)]
 pub(super) struct Place {
     /// In edges.
     pub place: DVec3,
@@ -42,25 +46,41 @@ impl Place {
         let unit = spots.iter().map(|spot| spot.place.distance(middle)).sum::<f64>() / spots.len() as f64;
         let across = across(spots, middle, unit);
         let sought = OFF.map(|off| off * across).into_iter().chain([BESIDE * towards]);
-        let found = sought.map(move |off| Self::at(spots, middle + unit * off).moved(spots, LONGEST * unit));
-        [Self::at(spots, middle)].into_iter().chain(found)
+        let found = sought.map(move |off| Self::at(spots, middle + unit * off, &[]).moved(spots, LONGEST * unit, &[]));
+        [Self::at(spots, middle, &[])].into_iter().chain(found)
     }
 
-    fn at(spots: &[Spot], place: DVec3) -> Self {
+    /// One where densities come to what they are on average. `others`: for each spot the density that other places tell, if any.
+    pub fn at(spots: &[Spot], place: DVec3, others: &[f64]) -> Self {
         let (mut level, mut all) = (0.0, 0.0);
         for spot in spots {
             level += spot.weight * (spot.density - Ray::between(spot, place).density());
             all += spot.weight;
         }
         let mut at = Self { place, level: level / all, misfit: 0.0 };
-        at.misfit = at.slope(spots).misfit;
+        at.misfit = at.slope(spots, others).misfit;
         at
+    }
+
+    /// The same place, with the level that fits most of the spots.
+    pub fn levelled(mut self, spots: &[Spot], others: &[f64]) -> Self {
+        for _ in 0..LEVELLINGS {
+            let Slope { squares, products, .. } = self.slope(spots, others);
+            self.level += products.w / squares.w_axis.w;
+        }
+        self.misfit = self.slope(spots, others).misfit;
+        self
+    }
+
+    /// The density that it tells of a spot.
+    pub fn density(&self, spot: &Spot) -> f64 {
+        exp2(self.level + Ray::between(spot, self.place).density())
     }
 
     /// The one that fits best near it, by the method of Levenberg (1944) and Marquardt (1963), with the weights of Geman and
     /// McClure (1985), so that what is far off, as behind something else, does not count.
-    fn moved(mut self, spots: &[Spot], longest: f64) -> Self {
-        let mut slope = self.slope(spots);
+    pub fn moved(mut self, spots: &[Spot], longest: f64, others: &[f64]) -> Self {
+        let mut slope = self.slope(spots, others);
         let mut damping = 0.01;
         for _ in 0..ROUNDS {
             let Slope { squares, products, .. } = slope;
@@ -68,7 +88,7 @@ impl Place {
             let step = (squares + DMat4::from_diagonal(damping * diagonal + 1e-9)).inverse() * products;
             let step = step * (longest / step.truncate().length()).min(1.0);
             let mut next = Self { place: self.place + step.truncate(), level: self.level + step.w, misfit: 0.0 };
-            let there = next.slope(spots);
+            let there = next.slope(spots, others);
             next.misfit = there.misfit;
             let gain = self.misfit - next.misfit;
             if gain > 0.0 {
@@ -84,14 +104,20 @@ impl Place {
         self
     }
 
-    fn slope(&self, spots: &[Spot]) -> Slope {
+    fn slope(&self, spots: &[Spot], others: &[f64]) -> Slope {
         let mut slope = Slope { misfit: 0.0, squares: DMat4::ZERO, products: DVec4::ZERO };
         let mut all = 0.0;
-        for spot in spots {
+        for (i, spot) in spots.iter().enumerate() {
             let ray = Ray::between(spot, self.place);
-            let off = spot.density - self.level - ray.density();
+            let mut off = spot.density - self.level - ray.density();
+            let mut growth = ray.growth(spot).extend(1.0);
+            if let Some(&other) = others.get(i) {
+                // Densities add up, and the logarithm of their sum grows with each by its share.
+                let own = exp2(self.level + ray.density());
+                off = spot.density - log2(own + other);
+                growth *= own / (own + other);
+            }
             let share = 1.0 / (1.0 + off * off);
-            let growth = ray.growth(spot).extend(1.0);
             let weighed = spot.weight * share * share * growth;
             slope.misfit += spot.weight * share * off * off;
             slope.products += off * weighed;
@@ -113,16 +139,16 @@ struct Slope {
 }
 
 /// From a spot to a place.
-struct Ray {
+pub(super) struct Ray {
     along: DVec3,
     /// The square of its length.
     squared: f64,
     /// Of the angle to the normal, and how much of it counts.
-    cosine: f64,
+    pub cosine: f64,
 }
 
 impl Ray {
-    fn between(spot: &Spot, place: DVec3) -> Self {
+    pub fn between(spot: &Spot, place: DVec3) -> Self {
         let along = place - spot.place;
         let squared = along.length_squared().max(NEAREST * NEAREST);
         Self { along, squared, cosine: spot.normal.dot(along) / squared.sqrt() }
@@ -162,19 +188,10 @@ pub(super) fn thinning(spots: &[Spot], place: DVec3, least_cosine: f64) -> Thinn
 pub(super) fn explained(spots: &[Spot], place: DVec3) -> f64 {
     /// Of logarithms to base 2: less is rounding.
     const LEAST_VARIANCE: f64 = 1e-6;
-    let variance = |density: &dyn Fn(&Spot) -> f64| {
-        let (mut sum, mut squares, mut all) = (0.0, 0.0, 0.0);
-        for spot in spots.iter().filter(|spot| Ray::between(spot, place).cosine.abs() >= FACING) {
-            let density = density(spot);
-            sum += spot.weight * density;
-            squares += spot.weight * density * density;
-            all += spot.weight;
-        }
-        (squares - sum * sum / all) / all
-    };
-    let known = variance(&|spot| spot.density);
+    let facing = || spots.iter().filter(|spot| Ray::between(spot, place).cosine.abs() >= FACING);
+    let known = variance(facing(), |spot| spot.density);
     if known > LEAST_VARIANCE {
-        1.0 - variance(&|spot| spot.density - Ray::between(spot, place).density()) / known
+        1.0 - variance(facing(), |spot| spot.density - Ray::between(spot, place).density()) / known
     } else {
         0.0
     }

@@ -25,6 +25,7 @@ const LEAST_SHARE: f64 = 0.7;
 const CERTAIN: f64 = 30.0;
 
 /// A piece of surface, in 2 x 2 x 2 cubes.
+#[derive(Clone, Copy)]
 pub(super) struct Spot {
     /// The middle of its points, in edges.
     pub place: DVec3,
@@ -58,6 +59,18 @@ pub(super) fn spots(ball: &Ball, grid: &Grid, patches: &Patches, what: &'static 
         }));
     }
     Ok(spots)
+}
+
+/// The variance of a value over some of them, by their weights.
+pub(super) fn variance<'a>(spots: impl Iterator<Item = &'a Spot>, value: impl Fn(&Spot) -> f64) -> f64 {
+    let (mut sum, mut squares, mut all) = (0.0, 0.0, 0.0);
+    for spot in spots {
+        let value = value(spot);
+        sum += spot.weight * value;
+        squares += spot.weight * value * value;
+        all += spot.weight;
+    }
+    (squares - sum * sum / all) / all
 }
 
 /// That of the largest of the patches of 2 x 2 x 2 cubes, and of those like it; each comes with the centre of its cube.

@@ -6,7 +6,7 @@ use super::cubes::Cubes;
 use super::patches::{Patch, Patches, signed};
 use super::place::{FACING, Place, explained, explained_by_normals, growth, thinning};
 use super::signs::Signs;
-use super::spots::{Spot, some_bricks, spots};
+use super::spots::{Spot, some_bricks};
 use super::thinning::Thinning;
 use crate::error::Error;
 use crate::grid::Grid;
@@ -91,32 +91,32 @@ impl Station {
     /// What is closed has no scanner beside it, and its middle is on no surface: there the law must hold, too, and where densities
     /// fit best.
     pub fn of(
+        spots: &[Spot],
         ball: &Ball,
         Cubes { grid, distinct, .. }: &Cubes,
         patches: &Patches,
         signs: &Signs,
         is_closed: bool,
     ) -> Result<Option<Self>, Error> {
-        let spots = spots(ball, grid, patches, WHAT)?;
         if spots.len() < LEAST_SPOTS {
             return Ok(None);
         }
         let middle = middle(ball, grid, distinct);
-        let about = thinning(&spots, middle, 0.0);
+        let about = thinning(spots, middle, 0.0);
         // NaN, where nothing tells them, is not.
         let may_be_amid = about.near >= LEAST_NEAR && about.explained >= LEAST_EXPLAINED;
-        let (towards, by_growth) = growth(&spots);
+        let (towards, by_growth) = growth(spots);
         let may_be_beside = by_growth >= LEAST_EXPLAINED;
         if !may_be_amid && !may_be_beside {
             return Ok(None);
         }
-        if is_closed && law(&spots, middle).is_none() {
+        if is_closed && law(spots, middle).is_none() {
             return Ok(None);
         }
         let samples = samples(ball, grid, patches, signs)?;
         let mut least_misfit = f64::INFINITY;
         let mut candidates = Vec::new();
-        for Place { place, misfit, .. } in Place::all(&spots, middle, towards) {
+        for Place { place, misfit, .. } in Place::all(spots, middle, towards) {
             least_misfit = least_misfit.min(misfit);
             let Sides { away, mixed } = Sides::of(&samples, signs.components, place)?;
             let most_away = if place == middle { MOST_AWAY } else { MOST_AWAY_THERE };
@@ -126,7 +126,7 @@ impl Station {
             let hidden = hidden(grid, patches, &samples, place);
             if hidden <= MOST_HIDDEN {
                 grow(&mut candidates, 1, WHAT)?;
-                candidates.push(Candidate { place, misfit, doubt: misfit + away.max(hidden), law: law(&spots, place) });
+                candidates.push(Candidate { place, misfit, doubt: misfit + away.max(hidden), law: law(spots, place) });
             }
         }
         let best = |by_law: bool| {
@@ -138,7 +138,7 @@ impl Station {
             best.law.filter(|_| !is_closed || is_room).map(|certainty| (best, certainty))
         } else if let Some(best) = best(false) {
             let is_told = |other: &Candidate| other.doubt >= best.doubt + CLEAR || !best.is_opposite(other, &samples);
-            let certainty = explained(&spots, best.place);
+            let certainty = explained(spots, best.place);
             let is_scan = !is_closed && certainty >= ENOUGH && candidates.iter().all(is_told);
             is_scan.then_some((best, certainty))
         } else {

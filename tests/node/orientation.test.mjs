@@ -10,6 +10,7 @@ import { likeliest } from '../../benches/orientation/attainable.mjs';
 import { MOST_SECONDS, rightSigns, verdicts } from '../../benches/orientation/judge.mjs';
 import { FULL, MODES, SMALL, measureAll, plannedRows, withOutside } from '../../benches/orientation/measure.mjs';
 import { details, report } from '../../benches/orientation/report.mjs';
+import { scene } from '../../benches/orientation/scene.mjs';
 import { SHAPES } from '../../benches/orientation/shapes.mjs';
 import { seenFrom } from '../../benches/orientation/single.mjs';
 import { signedVolume, thickness, windingNumber } from '../../benches/orientation/solid.mjs';
@@ -69,6 +70,17 @@ test('what holds for one sample of a shape holds for others', async () => {
     const { positions, normals: truth } = cloudOf(SHAPES[name].shape(), count, VARIANTS[variant], seed);
     const { normals } = await estimator.own.estimateNormals(positions, { orient: 'consistent' });
     assert.ok(rightSigns(normals, truth).share > 0.999, name);
+  }
+});
+
+test('a room that was scanned from several places faces these', async () => {
+  for (const stations of [2, 3]) {
+    const { positions, normals: truth } = cloudOf(scene(stations, true)(), 60_000, {}, 1);
+    const { normals, report } = await estimator.own.estimateNormals(positions, { orient: 'consistent' });
+    assert.ok(rightSigns(normals, truth).share > 0.99, `${stations}`);
+    assert.equal(report.components.largest[0].side, 'view');
+    const { report: outward } = await estimator.own.estimateNormals(positions, { orient: 'outward' });
+    assert.equal(outward.components.largest[0].side, 'air', 'nothing else tells it from a box');
   }
 });
 
