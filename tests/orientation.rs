@@ -500,6 +500,25 @@ fn edges_outweigh_what_is_seen_from_the_wrong_side() {
     }
 }
 
+/// What three lidars on it see of it, with a centimetre of noise: from above and from below it is the same.
+#[test]
+fn bare_flat_ground_tells_no_side() {
+    let mut random = Random(31);
+    let mut samples = vec![];
+    while samples.len() < 30_000 {
+        let [x, y] = [[0.0, 0.0], [9.0, 3.0], [-4.0, 11.0]][(3.0 * random.unit()) as usize];
+        let (slope, angle) = (random.unit(), TAU * random.unit());
+        let far = 1.5 * (1.0 / (slope * slope) - 1.0).sqrt();
+        if far < 15.0 {
+            let point = [x + far * angle.cos(), y + far * angle.sin(), 0.01 * random.signed()];
+            samples.push((point, [0.0, 0.0, 1.0]));
+        }
+    }
+    let ground = orient(&Cloud::of(samples.into_iter()).points, Orient::Consistent);
+    assert_eq!(components(&ground)[0].side, Side::Convention);
+    assert_eq!(ground.normals.chunks_exact(3).filter(|normal| normal[2] < 0.0).count(), 0);
+}
+
 /// Boxes in the corner of a room, two on the floor and one at a wall, too: of all that the air sees both sides.
 #[test]
 fn a_furnished_corner_has_one_sign() {

@@ -46,7 +46,7 @@ export interface EstimateOptions {
    * How signs are chosen. Default `'none'`: `x + 2y + 4z >= 0`, deterministic and nothing more. `'consistent'`: one sign
    * for each connected surface, outwards if it is closed, else towards what stands before it; if nothing does, as what it
    * touches, or away from its middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal; what one scanner saw from
-   * one place faces it. `'outward'`: the same, but never to what stands before it, nor to a scanner: for objects, also with
+   * one place, or a few from amid it, faces them. `'outward'`: the same, but never to what stands before it, nor to a scanner: for objects, also with
    * holes. Both also average normals, with `cell: 'auto'`, where surfaces face apart within the noise, as at edges and on
    * rods, and give the narrow sides of ribs and grooves without noise the planes that their points lie on: elsewhere only
    * signs change. `viewpoint`: towards a position, in the coordinates of `positions`. `up`: towards a direction of any

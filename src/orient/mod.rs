@@ -5,7 +5,7 @@
 //! wall ([`walls`]), which sides of a patch are open to the air says which way is out ([`air`]), and the signs are chosen that
 //! these agree with best ([`groups`]), of open surfaces also what their parts see of each other ([`looks`]). These then face what
 //! stands before them ([`facing`]), or the scanner, if one saw all: where it stood, if densities tell that ([`station`]), or the
-//! direction from which it did ([`view`]). Of a few points that are no surface, what is round them tells the side ([`specks`]).
+//! direction from which it did ([`view`]), or several that stood amid them ([`stations`]). Of a few points that are no surface, what is round them tells the side ([`specks`]).
 //! In noise normals then become means of those about them ([`means`]).
 
 mod air;
@@ -65,6 +65,9 @@ pub(crate) struct Surfaces {
     /// If asked for, for each point the number of its component by size, or [`NONE`].
     pub of_point: Option<Vec<u32>>,
 }
+
+/// What errors call the memory of the search for scanners.
+const WHAT: &str = "the scanners";
 
 /// The component of a point without a normal.
 const NONE: u32 = u32::MAX;
@@ -211,7 +214,7 @@ fn consistent(
         looks = Some(Looks::from_the_open(grid, patches, sights)?);
         choice.trust_links(&stage.part(0.6..0.65))?;
     }
-    let spots = spots(ball, grid, patches, "the scanners")?;
+    let spots = spots(ball, grid, patches, WHAT)?;
     let scanner =
         if let Some(station) = Station::of(&spots, ball, cubes, patches, choice.signs(), choice.is_all_closed())? {
             Some(Scanner::At(station))

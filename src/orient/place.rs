@@ -66,21 +66,28 @@ impl Place {
     pub fn levelled(mut self, spots: &[Spot], others: &[f64]) -> Self {
         for _ in 0..LEVELLINGS {
             let Slope { squares, products, .. } = self.slope(spots, others);
-            self.level += products.w / squares.w_axis.w;
+            self.level += products.w / (squares.w_axis.w + 1e-9);
         }
         self.misfit = self.slope(spots, others).misfit;
         self
     }
 
-    /// The density that it tells of a spot.
-    pub fn density(&self, spot: &Spot) -> f64 {
-        exp2(self.level + Ray::between(spot, self.place).density())
+    /// The density that it tells of a spot, from the ray between the two.
+    pub fn density(&self, ray: &Ray) -> f64 {
+        exp2(self.level) * ray.thinness()
+    }
+
+    /// The ray to it from a spot.
+    pub fn ray(&self, spot: &Spot) -> Ray {
+        Ray::between(spot, self.place)
     }
 
     /// The one that fits best near it, by the method of Levenberg (1944) and Marquardt (1963), with the weights of Geman and
     /// McClure (1985), so that what is far off, as behind something else, does not count.
     pub fn moved(mut self, spots: &[Spot], longest: f64, others: &[f64]) -> Self {
         let mut slope = self.slope(spots, others);
+        // The others may be new.
+        self.misfit = slope.misfit;
         let mut damping = 0.01;
         for _ in 0..ROUNDS {
             let Slope { squares, products, .. } = slope;
@@ -113,7 +120,7 @@ impl Place {
             let mut growth = ray.growth(spot).extend(1.0);
             if let Some(&other) = others.get(i) {
                 // Densities add up, and the logarithm of their sum grows with each by its share.
-                let own = exp2(self.level + ray.density());
+                let own = self.density(&ray);
                 off = spot.density - log2(own + other);
                 growth *= own / (own + other);
             }
@@ -148,15 +155,20 @@ pub(super) struct Ray {
 }
 
 impl Ray {
-    pub fn between(spot: &Spot, place: DVec3) -> Self {
+    fn between(spot: &Spot, place: DVec3) -> Self {
         let along = place - spot.place;
         let squared = along.length_squared().max(NEAREST * NEAREST);
         Self { along, squared, cosine: spot.normal.dot(along) / squared.sqrt() }
     }
 
-    /// The logarithm of the density there, but for the level.
+    /// The density there, but for the level.
+    pub fn thinness(&self) -> f64 {
+        self.cosine.abs().max(FACING) / self.squared
+    }
+
+    /// The logarithm of that.
     fn density(&self) -> f64 {
-        log2(self.cosine.abs().max(FACING) / self.squared)
+        log2(self.thinness())
     }
 
     /// How that changes with the place.

@@ -3,7 +3,7 @@
 use super::air::Sights;
 use super::components::{Decision, Side};
 use super::patches::{Patch, Patches, signed};
-use super::place::{FACING, LONGEST, Place, Ray, explained_by_normals};
+use super::place::{FACING, LONGEST, Place, explained_by_normals};
 use super::signs::{CLOSED, Signs};
 use super::spots::{Spot, variance};
 use crate::error::Error;
@@ -22,11 +22,13 @@ const LEAST_SPOTS: usize = 100;
 /// More scanners are not told apart; what they saw is explained by the nearest of them.
 const MOST: usize = 4;
 
-/// One more is sought before and behind so many spots, of those of the eighth that is denser than the others explain, so far off, in
-/// mean distances of the spots from their middle; and from the best of these places.
+/// One more is sought in the middle, and before and behind so many spots of the eighth that is denser than the others explain: so far
+/// off, in mean distances of the spots from their middle, and within the box round them.
 const SOUGHT: usize = 8;
 const AMONG: usize = 8;
 const OFF: [f64; 4] = [0.15, -0.15, 0.5, -0.5];
+
+/// From so many of these places, the best of them.
 const BEST: usize = 6;
 
 /// How often all places are moved after one more was found, and what one more leaves of the misfit at the most, or it is the last.
@@ -50,8 +52,9 @@ const BY_NORMALS: f64 = 0.2;
 /// A scanner has seen a surface if so much of the density there comes from it.
 const SEEN: f64 = 0.1;
 
-/// So much may face away from all that have seen it, of some patches.
+/// So much may face away from all that have seen it, of some patches, and so much has to have a side that they see.
 const MOST_AWAY: f64 = 0.12;
+const LEAST_TOLD: f64 = 0.5;
 const PATCHES: usize = 1 << 12;
 
 /// Where scanners stood.
@@ -62,7 +65,8 @@ pub(super) struct Stations {
 }
 
 impl Stations {
-    /// Those of a cloud, if it was taken from amid it. Some passes over a few hundred spots for each of them, where densities vary.
+    /// Those of a cloud, if it was taken from amid it. Where densities vary some hundred passes over a few hundred spots for each of
+    /// them, and if these explain it two over some patches and one over all.
     pub fn of(
         all: &[Spot],
         grid: &Grid,
@@ -77,10 +81,9 @@ impl Stations {
         grow(&mut spots, MOST_SPOTS, WHAT)?;
         spots.extend(all.iter().step_by(all.len().div_ceil(MOST_SPOTS)));
         let middle = spots.iter().map(|spot| spot.place).sum::<DVec3>() / spots.len() as f64;
-        if explained_by_normals(&spots, middle) > BY_NORMALS {
-            return Ok(None);
-        }
-        let Some(places) = places(&spots, middle)? else { return Ok(None) };
+        // NaN, where nothing faces the middle, tells no scanners.
+        let may_be_amid = explained_by_normals(&spots, middle) <= BY_NORMALS;
+        let Some(places) = (if may_be_amid { places(&spots, middle)? } else { None }) else { return Ok(None) };
         let certainty = explained(&spots, &places);
         let stations = Self { places, certainty };
         let is_told = certainty >= EXPLAINED
@@ -89,19 +92,20 @@ impl Stations {
         Ok(is_told.then_some(stations))
     }
 
-    /// What faces them less what faces away, by how much of the density comes from each, up to 1 and down to -1; and whether those
-    /// that have seen it are all on one side.
+    /// By how much more of the density a patch faces those from which that comes, from 1 down to -1 where it faces away; and whether
+    /// those that have seen it are all on one side.
     fn side(&self, patch: &Patch, place: DVec3) -> (f64, bool) {
         let spot = Spot { place, normal: patch.normal.as_dvec3(), density: 0.0, weight: 0.0 };
-        let all: f64 = self.places.iter().map(|one| one.density(&spot)).sum();
+        let seen =
+            || self.places.iter().map(|one| (one.ray(&spot), one)).map(|(ray, one)| (one.density(&ray), ray.cosine));
+        let all: f64 = seen().map(|(density, _)| density).sum();
         let (mut balance, mut before, mut behind) = (0.0, false, false);
-        for one in &self.places {
-            let (share, cosine) = (one.density(&spot) / all, Ray::between(&spot, one.place).cosine);
-            balance += share * cosine.signum();
-            before |= share >= SEEN && cosine > -FACING;
-            behind |= share >= SEEN && cosine < FACING;
+        for (density, cosine) in seen() {
+            balance += density * cosine.signum();
+            before |= density >= SEEN * all && cosine > -FACING;
+            behind |= density >= SEEN * all && cosine < FACING;
         }
-        (balance, before != behind)
+        (balance / all, before != behind)
     }
 
     /// For each component whether most of it faces away, of every `step`th patch.
@@ -116,33 +120,39 @@ impl Stations {
         Ok(turned)
     }
 
-    /// The share of some patches that faces away from all that have seen it, once components are turned.
+    /// The share of some patches that faces away from all that have seen it, once components are turned; all where little has a
+    /// side, as of flat ground that they stood in.
     fn away(&self, grid: &Grid, patches: &Patches, signs: &Signs) -> Result<f64, Error> {
         let step = patches.all.len().div_ceil(PATCHES);
         let turned = self.turned(grid, patches, signs, step)?;
-        let (mut away, mut all) = (0.0, 0.0);
+        let (mut away, mut told, mut all) = (0.0, 0.0, 0.0);
         for (i, (patch, place)) in patches.places(grid).enumerate().step_by(step) {
             let (balance, is_told) = self.side(patch, place);
             let is_turned = signs.flipped[i] ^ turned[signs.component[i] as usize];
-            all += f64::from(patch.points);
-            away += if is_told && signed(is_turned, balance) < 0.0 { f64::from(patch.points) } else { 0.0 };
+            let points = f64::from(patch.points);
+            all += points;
+            told += if is_told { points } else { 0.0 };
+            away += if is_told && signed(is_turned, balance) < 0.0 { points } else { 0.0 };
         }
-        Ok(away / all)
+        Ok(if told < LEAST_TOLD * all { 1.0 } else { away / all })
     }
 
     /// Whether they saw from the open what the largest component bounds, if that is closed: such a body faces outwards in any case.
     fn are_outside(&self, grid: &Grid, patches: &Patches, sights: &Sights, signs: &Signs) -> Result<bool, Error> {
-        let mut seen = filled(Seen::default(), signs.components, WHAT)?;
-        for (i, (patch, place)) in patches.places(grid).enumerate() {
-            let (one, points) = (&mut seen[signs.component[i] as usize], f64::from(patch.points));
-            one.points += points;
-            one.balance += signed(signs.flipped[i], points * self.side(patch, place).0);
-            one.exposure += signed(signs.flipped[i], f64::from(sights.exposure[i]));
-            one.sight += f64::from(sights.all[i]);
+        let mut points = filled(0u64, signs.components, WHAT)?;
+        for (patch, &component) in patches.all.iter().zip(&signs.component) {
+            points[component as usize] += u64::from(patch.points);
         }
-        let largest = seen.into_iter().max_by(|one, other| one.points.total_cmp(&other.points)).unwrap_or_default();
-        let is_closed = largest.exposure.abs() > CLOSED * largest.sight;
-        Ok(is_closed && largest.exposure * largest.balance > 0.0)
+        let largest = (0..points.len()).max_by_key(|&component| points[component]);
+        let (mut balance, mut exposure, mut sight) = (0.0, 0.0, 0.0);
+        for (i, (patch, place)) in patches.places(grid).enumerate() {
+            if Some(signs.component[i] as usize) == largest {
+                balance += signed(signs.flipped[i], f64::from(patch.points) * self.side(patch, place).0);
+                exposure += f64::from(signed(signs.flipped[i], sights.exposure[i]));
+                sight += f64::from(sights.all[i]);
+            }
+        }
+        Ok(exposure.abs() > CLOSED * sight && exposure * balance > 0.0)
     }
 
     /// Turns surfaces to them, as a whole: of what hides behind other things the nearest one may have seen nothing.
@@ -162,17 +172,6 @@ impl Stations {
         }
         Ok(())
     }
-}
-
-/// What a component faces, with its normals as they were signed.
-#[derive(Clone, Copy, Default)]
-struct Seen {
-    points: f64,
-    /// More scanners than behind it.
-    balance: f64,
-    /// More of the open, and all of that which is seen of it.
-    exposure: f64,
-    sight: f64,
 }
 
 /// Places that explain densities together, one after the other, if they do and these vary.
@@ -197,7 +196,8 @@ fn places(spots: &[Spot], middle: DVec3) -> Result<Option<Vec<Place>>, Error> {
         let excess = |i: usize| spots[i].weight * (spots[i].density - known.get(i).map_or(level, |&known| log2(known)));
         let mut denser: Vec<usize> = (0..spots.len()).collect();
         denser.sort_by(|&one, &other| excess(other).total_cmp(&excess(one)));
-        let sought = denser[..spots.len() / AMONG].iter().step_by(spots.len() / AMONG / SOUGHT);
+        let few = &denser[..spots.len() / AMONG];
+        let sought = few.iter().step_by(few.len().div_ceil(SOUGHT));
         let sought = sought.flat_map(|&i| OFF.map(|off| spots[i].place + off * unit * spots[i].normal));
         let is_amid = |place: &DVec3| place.cmpge(low).all() && place.cmple(high).all();
         let mut sought: Vec<Place> = sought
@@ -239,14 +239,14 @@ fn densities(spots: &[Spot], places: &[Place], but: Option<usize>) -> Result<Vec
     let others = || places.iter().enumerate().filter(|&(i, _)| Some(i) != but);
     let mut sums = filled(0.0, if others().count() > 0 { spots.len() } else { 0 }, WHAT)?;
     for (sum, spot) in sums.iter_mut().zip(spots) {
-        *sum = others().map(|(_, place)| place.density(spot)).sum();
+        *sum = others().map(|(_, place)| place.density(&place.ray(spot))).sum();
     }
     Ok(sums)
 }
 
 /// The share of the variance of densities that places explain.
 fn explained(spots: &[Spot], places: &[Place]) -> f64 {
-    let told = |spot: &Spot| log2(places.iter().map(|place| place.density(spot)).sum());
+    let told = |spot: &Spot| log2(places.iter().map(|place| place.density(&place.ray(spot))).sum());
     1.0 - variance(spots.iter(), |spot| spot.density - told(spot)) / variance(spots.iter(), |spot| spot.density)
 }
 
