@@ -43,14 +43,15 @@ export interface EstimateOptions {
    */
   k?: number;
   /**
-   * How signs are chosen. Default `'none'`: `x + 2y + 4z >= 0`, deterministic and nothing more. `'consistent'`: one sign
-   * for each connected surface, outwards if it is closed, else towards what stands before it; if nothing does, as what it
-   * touches, or away from its middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal; what one scanner saw from
-   * one place, or a few from amid it, faces them. `'outward'`: the same, but never to what stands before it, nor to a scanner: for objects, also with
-   * holes. Both also average normals, with `cell: 'auto'`, where surfaces face apart within the noise, as at edges and on
-   * rods, and give the narrow sides of ribs and grooves without noise the planes that their points lie on: elsewhere only
-   * signs change. `viewpoint`: towards a position, in the coordinates of `positions`. `up`: towards a direction of any
-   * length but 0, for terrain. Both are arrays of three finite numbers.
+   * How signs are chosen. Default `'none'`: `x + 2y + 4z >= 0`, deterministic and nothing more. `'consistent'`: one
+   * sign for each connected surface, outwards if it is closed, else towards what stands before it; if nothing does, as
+   * what it touches, or away from its middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal; what one
+   * scanner saw from one place, or a few from amid it, faces them. `'outward'`: the same, but never to what stands
+   * before it, nor to a scanner: for objects, also with holes. Both also average normals, with `cell: 'auto'`, where
+   * surfaces face apart within the noise, as at edges and on rods, and give the narrow sides of ribs and grooves
+   * without noise the planes that their points lie on: elsewhere only signs change. `viewpoint`: towards a position,
+   * in the coordinates of `positions`. `up`: towards a direction of any length but 0, for terrain. Both are arrays of
+   * three finite numbers.
    */
   orient?:
     'none' | 'consistent' | 'outward' | { viewpoint: [number, number, number] } | { up: [number, number, number] };
