@@ -66,9 +66,10 @@ pub enum Orient {
     /// One sign for each connected surface: outwards if it is closed, else towards what stands before it; if nothing does, as
     /// what it touches, or away from its middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal. If all was seen from
     /// one place, everything faces it, and surfaces face a few scanners that stood amid them, where densities tell these. For
-    /// anything; [`crate::Report::components`] tells how sure it is. With [`Method::Bilinear`] and [`Cell::Auto`] also the lines of some normals change, because no sign of them would be right:
-    /// in noise, where surfaces face apart within it, to a mean of normals with their signs; and without any noise, where a
-    /// face is too narrow for a surface, to that of the plane that the points lie on.
+    /// anything; [`crate::Report::components`] tells how sure it is. With [`Method::Bilinear`] and [`Cell::Auto`] also the
+    /// lines of some normals change, because no sign of them would be right: in noise, where surfaces face apart within it, to
+    /// a mean of normals with their signs; and without any noise, where a face is too narrow for a surface, to that of the
+    /// plane that the points lie on.
     Consistent,
     /// One sign for each connected surface, away from its inside, also if it is not closed, and to nothing that stands before it,
     /// nor to a scanner: for objects, also with holes.
