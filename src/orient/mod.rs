@@ -1,12 +1,12 @@
 //! The signs of normals, whichever method found them.
 //!
-//! `docs/orientation.md` explains the rule, its sources and its limits. In short: the points of each small cube are parted
-//! into patches ([`patches`]), a patch and those round it say whether their signs agree ([`links`]), and so do the two sides of a
+//! `docs/orientation.md` explains the rule, its sources and its limits. In short: the points of each small cube are parted into
+//! patches ([`patches`]), a patch and those round it say whether their signs agree ([`links`]), and so do the two sides of a
 //! wall ([`walls`]), which sides of a patch are open to the air says which way is out ([`air`]), and the signs are chosen that
-//! these agree with best ([`groups`]), of open surfaces also what their parts see of each other ([`looks`]). These then face what
-//! stands before them ([`facing`]), or the scanner, if one saw all: where it stood, if densities tell that ([`station`]), or the
-//! direction from which it did ([`view`]), or several that stood amid them ([`stations`]). Of a few points that are no surface, what is round them tells the side ([`specks`]).
-//! In noise normals then become means of those about them ([`means`]).
+//! these agree with best ([`groups`]), of open surfaces also what their parts see of each other ([`looks`]). These then face
+//! what stands before them ([`facing`]), or the scanner, if one saw all: where it stood, if densities tell that ([`station`]),
+//! or the direction from which it did ([`view`]), or several that stood amid them ([`stations`]). Of a few points that are no
+//! surface, what is round them tells the side ([`specks`]). In noise normals then become means of those about them ([`means`]).
 
 mod air;
 mod ball;
@@ -198,7 +198,7 @@ fn outward(
 
 /// Signs that trust no part of the open that may mislead: of what is not closed a share counts, beside what its patches see of
 /// each other; but not where all was seen from one place, because that is open all over behind, and the hollow side of it looks
-/// at itself. Also these looks, if there is anything that is not closed, and the scanner, if there was one.
+/// at itself. Also these looks, if there is anything that is not closed, and the scanner or several, if these saw all.
 fn consistent(
     (groups, walls): (Groups, Vec<Pair>),
     ball: &Ball,

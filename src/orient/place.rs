@@ -54,7 +54,7 @@ impl Place {
     pub fn at(spots: &[Spot], place: DVec3, others: &[f64]) -> Self {
         let (mut level, mut all) = (0.0, 0.0);
         for spot in spots {
-            level += spot.weight * (spot.density - Ray::between(spot, place).density());
+            level += spot.weight * (spot.density - Ray::between(spot, place).log_density());
             all += spot.weight;
         }
         let mut at = Self { place, level: level / all, misfit: 0.0 };
@@ -74,7 +74,7 @@ impl Place {
 
     /// The density that it tells of a spot, from the ray between the two.
     pub fn density(&self, ray: &Ray) -> f64 {
-        exp2(self.level) * ray.thinness()
+        exp2(self.level) * ray.density()
     }
 
     /// The ray to it from a spot.
@@ -116,15 +116,16 @@ impl Place {
         let mut all = 0.0;
         for (i, spot) in spots.iter().enumerate() {
             let ray = Ray::between(spot, self.place);
-            let mut off = spot.density - self.level - ray.density();
-            let mut growth = ray.growth(spot).extend(1.0);
-            if let Some(&other) = others.get(i) {
-                // Densities add up, and the logarithm of their sum grows with each by its share.
-                let own = self.density(&ray);
-                off = spot.density - log2(own + other);
-                growth *= own / (own + other);
-            }
-            let share = 1.0 / (1.0 + off * off);
+            // Densities add up, and the logarithm of their sum grows with each by its part of it.
+            let (off, part) = match others.get(i) {
+                None => (spot.density - self.level - ray.log_density(), 1.0),
+                Some(&other) => {
+                    let own = self.density(&ray);
+                    (spot.density - log2(own + other), own / (own + other))
+                }
+            };
+            let share = share(off);
+            let growth = part * ray.growth(spot).extend(1.0);
             let weighed = spot.weight * share * share * growth;
             slope.misfit += spot.weight * share * off * off;
             slope.products += off * weighed;
@@ -135,6 +136,11 @@ impl Place {
         slope.misfit /= all;
         slope
     }
+}
+
+/// The share of its square that a difference counts (Geman and McClure): so none counts more than 1.
+pub(super) fn share(off: f64) -> f64 {
+    1.0 / (1.0 + off * off)
 }
 
 /// What densities differ from what a place tells, and how that changes with the place and the level: sums for the normal
@@ -162,13 +168,13 @@ impl Ray {
     }
 
     /// The density there, but for the level.
-    pub fn thinness(&self) -> f64 {
+    pub fn density(&self) -> f64 {
         self.cosine.abs().max(FACING) / self.squared
     }
 
     /// The logarithm of that.
-    fn density(&self) -> f64 {
-        log2(self.thinness())
+    fn log_density(&self) -> f64 {
+        log2(self.density())
     }
 
     /// How that changes with the place.
@@ -203,7 +209,7 @@ pub(super) fn explained(spots: &[Spot], place: DVec3) -> f64 {
     let facing = || spots.iter().filter(|spot| Ray::between(spot, place).cosine.abs() >= FACING);
     let known = variance(facing(), |spot| spot.density);
     if known > LEAST_VARIANCE {
-        1.0 - variance(facing(), |spot| spot.density - Ray::between(spot, place).density()) / known
+        1.0 - variance(facing(), |spot| spot.density - Ray::between(spot, place).log_density()) / known
     } else {
         0.0
     }

@@ -3,7 +3,7 @@
 use super::air::Sights;
 use super::components::{Decision, Side};
 use super::patches::{Patch, Patches, signed};
-use super::place::{FACING, LONGEST, Place, explained_by_normals};
+use super::place::{FACING, LONGEST, Place, explained_by_normals, share};
 use super::signs::{CLOSED, Signs};
 use super::spots::{Spot, variance};
 use crate::error::Error;
@@ -179,7 +179,10 @@ fn places(spots: &[Spot], middle: DVec3) -> Result<Option<Vec<Place>>, Error> {
     let all: f64 = spots.iter().map(|spot| spot.weight).sum();
     let mean = |of: &dyn Fn(&Spot) -> f64| spots.iter().map(|spot| spot.weight * of(spot)).sum::<f64>() / all;
     let level = mean(&|spot| spot.density);
-    let even = mean(&|spot| misfit(spot.density - level));
+    let even = mean(&|spot| {
+        let off = spot.density - level;
+        share(off) * off * off
+    });
     if even < VARIED {
         return Ok(None);
     }
@@ -227,11 +230,6 @@ fn places(spots: &[Spot], middle: DVec3) -> Result<Option<Vec<Place>>, Error> {
         left = misfit;
     }
     Ok((places[places.len() - 1].misfit <= LEFT * even).then_some(places))
-}
-
-/// What a difference counts, up to 1 (Geman and McClure).
-fn misfit(off: f64) -> f64 {
-    off * off / (1.0 + off * off)
 }
 
 /// For each spot the density that places tell together, but for one of them; empty if there are no others.
