@@ -252,6 +252,7 @@ fn explained(spots: &[Spot], places: &[Place]) -> f64 {
 mod tests {
     use super::super::place::tests::{seen_from, walls};
     use super::*;
+    use glam::Vec3;
 
     const STOOD: [DVec3; 3] =
         [DVec3::new(14.0, -7.0, 3.0), DVec3::new(-13.0, -20.0, -5.0), DVec3::new(-4.0, 21.0, 6.0)];
@@ -275,5 +276,19 @@ mod tests {
         // From round it, far off: each side by its own scanner.
         let around = |_: DVec3, normal: DVec3| 1.0 + 8.0 * (normal.x + 0.5 * normal.y).powi(2) + normal.z;
         assert!(explained_by_normals(&walls(around), DVec3::ZERO) > BY_NORMALS);
+    }
+
+    #[test]
+    fn what_scanners_see_from_both_sides_or_from_neither_has_no_side() {
+        let spots = walls(|_, _| 7.0);
+        let normal = Vec3::Z;
+        let patch = Patch { centre: Vec3::ZERO, normal, points: 16, flatness: 1.0, has_rival: false, bend: 0.0 };
+        let side = |stood: &[DVec3]| {
+            let places = stood.iter().map(|&place| Place::at(&spots, place, &[])).collect();
+            Stations { places, certainty: 1.0 }.side(&patch, DVec3::ZERO)
+        };
+        let (above, below, in_it) = (DVec3::new(1.0, 0.0, 9.0), DVec3::new(1.0, 0.0, -9.0), DVec3::new(9.0, 0.0, 0.1));
+        assert_eq!([side(&[above]), side(&[below])], [(1.0, true), (-1.0, true)]);
+        assert!(!side(&[above, below]).1 && !side(&[in_it]).1);
     }
 }
