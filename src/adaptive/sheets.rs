@@ -8,7 +8,7 @@
 use super::around::Near;
 use super::level::Level;
 use super::samples::{Sample, Window};
-use super::surface::{Quadric, Surface};
+use super::surface::Quadric;
 use glam::Vec3;
 
 /// Neighbourhoods of more points are left to the surfaces.
@@ -18,7 +18,7 @@ const ROOM: usize = u128::BITS as usize;
 const LEAST: u32 = 10;
 
 /// Points lie on their sheet to a thousandth of an edge, squared and on average.
-const ON: f32 = 1e-6;
+const ON: f32 = 3e-6;
 
 /// From each time to the next no more than this share of the noise is left, or these are not two sheets.
 const LEFT: f32 = 0.5;
@@ -39,7 +39,7 @@ impl Sheets {
 
     /// Finds the sheets near the cube with bit `bit` of a brick, on whose two sides a surface was fitted, if these are two.
     #[inline(never)]
-    pub fn find(&mut self, level: &Level, bit: u32, near: &[Near], between: &Surface) -> bool {
+    pub fn find(&mut self, level: &Level, bit: u32, near: &[Near]) -> bool {
         self.places.clear();
         for (shift, points) in level.points_near(bit, near) {
             if self.places.len() + points.len() > ROOM {
@@ -47,6 +47,9 @@ impl Sheets {
             }
             self.places.extend(points.iter().map(|p| p.local + shift));
         }
+        self.window.clear();
+        self.places.iter().for_each(|&place| self.window.add(&[Sample::point(place)], Vec3::ZERO, 1.0));
+        let between = self.window.fit();
         let mut noise = between.noise;
         self.part(|_, place| between.quadric.at(place).1 > 0.0);
         while let Some(left) = self.fit(LEFT * noise) {

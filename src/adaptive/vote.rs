@@ -75,6 +75,9 @@ const SHEET: usize = 25;
 /// In an exact cloud a surface with more noise than this, in edges and squared, may lie between two sheets.
 const BETWEEN: f32 = 3e-4;
 
+/// A neighbourhood of fewer points may have too few of each sheet.
+const FEW_POINTS: f32 = 40.0;
+
 /// The cubes of a level, and the surfaces they rest on.
 pub(super) struct Vote<'a> {
     pub level: &'a Level,
@@ -147,7 +150,11 @@ impl<'a> Task<'a> {
     /// Whether a surface that was fitted to a cube lies between two sheets.
     fn is_between(&mut self, brick: usize, bit: u32, surface: &Surface) -> bool {
         let Self { vote: Vote { level, .. }, around, sheets, .. } = self;
-        sheets.as_mut().is_some_and(|sheets| sheets.find(level, bit, around.near(&level.grid, brick, bit, 1), surface))
+        sheets.as_mut().is_some_and(|sheets| {
+            let mut find = |reach| sheets.find(level, bit, around.near(&level.grid, brick, bit, reach));
+            // The 27 cubes may have too few points to tell.
+            find(1) || surface.points < FEW_POINTS && find(2)
+        })
     }
 
     /// Whether the surface of a cube may lie across an edge of faces that points tell better.
