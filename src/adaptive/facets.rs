@@ -61,10 +61,10 @@ const WIDE: f32 = 0.03;
 const ROWS: f32 = 1.0 / 12.0;
 const IN_ROW: f32 = ON / 16.0;
 
-/// A normal is doubtful where fewer than so many of the first points next to it are across it to a fiftieth: on one of the two
+/// A normal is doubtful where fewer than so many of the first points next to it are across it to 0.003: on one of the two
 /// faces of an edge half of them are.
 const ACROSS: usize = 3;
-const FLAT: f32 = 0.02;
+const FLAT: f32 = 0.003;
 
 /// What is left in doubt lies on a plane with so many more points than lie nearly on it.
 const CLEAR: f32 = 4.0;
