@@ -198,7 +198,12 @@ fn describe(cloud: &Cloud, lattice: &Lattice, found: &Found, laps: Laps) -> Repo
 }
 
 /// Cubes of the sizes that the cloud asks for, along axes of its own; also how densely it is covered, as it lies in the input.
-fn adaptive(mut points: Points, cloud: &Cloud, options: &Options, mut laps: Laps) -> Result<(Estimate, Density), Error> {
+fn adaptive(
+    mut points: Points,
+    cloud: &Cloud,
+    options: &Options,
+    mut laps: Laps,
+) -> Result<(Estimate, Density), Error> {
     let progress = laps.progress;
     progress.update("cellSize", 0.03)?;
     let frame = Frame::of(&points);

@@ -411,6 +411,22 @@ mod tests {
         assert!(!is_face_of(|i, _| lattice(i)), "a lattice");
     }
 
+    /// One of some twenty points is in line with the next one now and then.
+    #[test]
+    fn a_face_is_no_row_for_one_point_in_line() {
+        let mut in_line = 0;
+        for shift in 0..40 {
+            let along = 0.2 + 0.01 * shift as f32;
+            let place = |i: usize, u: &mut dyn FnMut() -> f32| match i {
+                0 => Vec3::new(0.01, 0.02, 0.0),
+                1 => Vec3::new(along, 2.0 * along, 0.0),
+                _ => Vec3::new(u(), u(), 0.0),
+            };
+            in_line += usize::from(is_face_of(place));
+        }
+        assert_eq!(in_line, 40);
+    }
+
     /// The tip of a blade, whose faces meet at 28 degrees, seen from there.
     #[test]
     fn a_face_is_as_wide_as_it_is_wherever_it_is_seen_from() {

@@ -17,7 +17,7 @@ const ROOM: usize = u128::BITS as usize;
 /// A sheet has so many points: four more than a quadratic surface takes.
 const LEAST: u32 = 10;
 
-/// Points lie on their sheet to a thousandth of an edge, squared and on average.
+/// Points lie on their sheet to 0.0017 edges, squared and on average.
 const ON: f32 = 3e-6;
 
 /// From each time to the next no more than this share of the noise is left, or these are not two sheets.
@@ -37,7 +37,8 @@ impl Sheets {
         Self { window: Window::new(), places: Vec::new(), second: 0, both: [Quadric::NONE; 2] }
     }
 
-    /// Finds the sheets near the cube with bit `bit` of a brick, on whose two sides a surface was fitted, if these are two.
+    /// Finds the sheets that the points of some cubes near the one with bit `bit` of a brick lie on, if these are two: on either
+    /// side of the surface through all.
     #[inline(never)]
     pub fn find(&mut self, level: &Level, bit: u32, near: &[Near]) -> bool {
         self.places.clear();

@@ -244,7 +244,9 @@ fn split(
 ) {
     let first = patches.len();
     if let Some((patch, doubt)) = whole(points, normals, centre, limits) {
-        if limits.slack.is_some_and(|slack| doubt.is_some(slack)) && part(points, normals, centre, limits, patches, of_point) {
+        if limits.slack.is_some_and(|slack| doubt.is_some(slack))
+            && part(points, normals, centre, limits, patches, of_point)
+        {
             return;
         }
         patches.push(patch);

@@ -170,6 +170,12 @@ mod tests {
             assert_eq!(second_of(|_, x, y| (0.5 * bend * (x * x + y * y), bend * x, bend * y)), 0);
             assert_eq!(second_of(|_, x, y| (bend * x * y, bend * y, bend * x)), 0, "a saddle");
         }
+        // A single point of the other ball, next to where they touch.
+        let single = second_of(|i, x, y| {
+            let bend = if i == 11 { 0.06 } else { -0.06 };
+            (0.5 * bend * (x * x + y * y), bend * x, bend * y)
+        });
+        assert!(single == 1 << 11 || single == (1 << 30) - 1 - (1 << 11), "{single:b}");
         let blade = second_of(|i, x, _| {
             let slope = if i % 2 == 0 { 0.25 } else { -0.25 };
             (slope * (x + 0.5), slope, 0.0)
