@@ -125,7 +125,7 @@ fn run(points: Points, options: &Options, progress: &Progress) -> Result<Estimat
     laps.end("bounds");
 
     if !cfg!(feature = "full") {
-        return adaptive(points, &cloud, options, laps).map(|(estimate, _)| estimate);
+        return adaptive(points, &cloud, options, laps);
     }
     // Those that signs need are borrowed, others given away.
     let kept;
@@ -135,13 +135,8 @@ fn run(points: Points, options: &Options, progress: &Progress) -> Result<Estimat
     } else {
         (points, None)
     };
-    let mut density = None;
     let mut estimate = match (options.method, options.cell) {
-        (Method::Bilinear, Cell::Auto) => {
-            let (estimate, found) = adaptive(points.owned()?, &cloud, options, laps)?;
-            density = Some(found);
-            Ok(estimate)
-        }
+        (Method::Bilinear, Cell::Auto) => adaptive(points.owned()?, &cloud, options, laps),
         (Method::Bilinear, Cell::Scale(scale)) => bilinear(points, &cloud, options, scale * cloud.paper_edge(), laps),
         (Method::Bilinear, Cell::Size(size)) => {
             bilinear(points, &cloud, options, cell::edge_of_size(size, cloud.unit, cloud.paper_edge())?, laps)
@@ -157,7 +152,7 @@ fn run(points: Points, options: &Options, progress: &Progress) -> Result<Estimat
         let mut laps = Laps::start(progress);
         let normals = bytemuck::cast_slice_mut(&mut estimate.normals);
         let stage = progress.stage("orientation", share..1.0);
-        let surfaces = orient(needed, normals, &cloud.bounds, density, options, &stage)?;
+        let surfaces = orient(needed, normals, &cloud.bounds, options, &stage)?;
         if let Some(surfaces) = surfaces {
             estimate.components = surfaces.of_point;
             estimate.report.components = Some(surfaces.components);
@@ -197,18 +192,13 @@ fn describe(cloud: &Cloud, lattice: &Lattice, found: &Found, laps: Laps) -> Repo
     }
 }
 
-/// Cubes of the sizes that the cloud asks for, along axes of its own; also how densely it is covered, as it lies in the input.
-fn adaptive(
-    mut points: Points,
-    cloud: &Cloud,
-    options: &Options,
-    mut laps: Laps,
-) -> Result<(Estimate, Density), Error> {
+/// Cubes of the sizes that the cloud asks for, along axes of its own.
+fn adaptive(mut points: Points, cloud: &Cloud, options: &Options, mut laps: Laps) -> Result<Estimate, Error> {
     let progress = laps.progress;
     progress.update("cellSize", 0.03)?;
     let frame = Frame::of(&points);
     let bounds = frame.turn(points.positions_mut());
-    let mut density = Density::of(&points, &bounds)?;
+    let density = Density::of(&points, &bounds)?;
     let lattice = Lattice::new(&bounds, &|| density.middle, density.edge(cell::POINTS_PER_CELL), adaptive::CUBES);
     laps.end("cellSize");
     let lap = &mut |phase| laps.end(phase);
@@ -220,9 +210,8 @@ fn adaptive(
     let scale = |&(edges, points): &(f64, u64)| Scale { cell_size: edges * report.cell_size, points };
     report.scales = answer.scales.iter().map(scale).collect();
     report.nodes_used[0] = report.points;
-    density.middle = frame.turn_back(density.middle);
     let Found { normals, curvature, .. } = answer.found;
-    Ok((Estimate { normals, curvature, components: None, report }, density))
+    Ok(Estimate { normals, curvature, components: None, report })
 }
 
 /// Cubes of one size: the paper's method.

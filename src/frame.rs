@@ -78,12 +78,6 @@ impl Frame {
         })
     }
 
-    /// Moves a place of this frame back to where it was.
-    pub fn turn_back(&self, place: DVec3) -> DVec3 {
-        let [x, y, z] = self.axes.map(Vec3::as_dvec3);
-        self.origin + x * place.x + y * place.y + z * place.z
-    }
-
     #[inline(never)]
     fn turn_chunk(&self, chunk: &mut [Vec3]) {
         let [x, y, z] = [0, 1, 2].map(|i| Vec4::new(self.axes[0][i], self.axes[1][i], self.axes[2][i], 0.0));

@@ -73,7 +73,7 @@ const WHAT: &str = "the scanners";
 const NONE: u32 = u32::MAX;
 
 /// Turns the normals of all points as `options.orient` asks; answers for surfaces what was decided for each. `points` may
-/// be missing if the signs do not need them ([`Orient::needs_positions`]), and `density` if nobody has measured it.
+/// be missing if the signs do not need them ([`Orient::needs_positions`]).
 ///
 /// Towards a position or a direction: one pass over the points. Otherwise linear in the points; besides these and the normals
 /// some 27 bytes for each on smooth surfaces, up to 190 where there is no surface at all.
@@ -81,7 +81,6 @@ pub(crate) fn orient(
     points: Option<&Points>,
     normals: &mut [Vec3],
     bounds: &Bounds,
-    density: Option<Density>,
     options: &Options,
     stage: &Stage,
 ) -> Result<Option<Surfaces>, Error> {
@@ -102,7 +101,7 @@ pub(crate) fn orient(
             face(normals, &|point| viewpoint - points.positions[point].as_dvec3(), stage).map(|()| None)
         }
         (Orient::Consistent | Orient::Outward, Some(points)) => {
-            let density = density.map_or_else(|| Density::of(points, bounds), Ok)?;
+            let density = Density::of(points, bounds)?;
             surfaces(points, normals, bounds, &density, options, stage).map(Some)
         }
     }
