@@ -242,6 +242,7 @@ impl Facets {
         self.sort();
         let next = &self.next[..FIRSTS];
         let pairs = next.iter().enumerate().flat_map(|(i, a)| next[i + 1..].iter().map(move |b| (a, b)));
+        // As if the cloud were not exact: it is asked to tell whether it is.
         pairs.into_iter().any(|(a, b)| {
             let normal = a.truncate().cross(b.truncate());
             let square = normal.length_squared();
