@@ -33,6 +33,9 @@ pub(super) struct Cubes {
     pub edge: f64,
     /// How far points lie off their surface, in edges.
     pub noise: f32,
+    /// How far points next to each other lie off a sheet that goes through both as their normals say, in edges: nothing where
+    /// there is no noise, however the surface bends.
+    pub slack: f32,
 }
 
 /// Sorts the points once, noisy ones twice.
@@ -51,7 +54,8 @@ pub(super) fn sort(
     let (grid, distinct) = sort(edge, &stage.part(0.0..0.5))?;
     let found = noise(&grid, normals, 1.0)?;
     if found <= LARGEST_NOISE {
-        return Ok(Cubes { grid, distinct, edge, noise: found });
+        let slack = slack(&grid, normals)?;
+        return Ok(Cubes { grid, distinct, edge, noise: found, slack });
     }
     let mut scale = ENLARGEMENT;
     // The largest are taken whatever their noise.
@@ -61,8 +65,8 @@ pub(super) fn sort(
     drop((grid, distinct));
     let edge = f64::from(scale) * edge;
     let (grid, distinct) = sort(edge, &stage.part(0.5..1.0))?;
-    let noise = noise(&grid, normals, 1.0)?;
-    Ok(Cubes { grid, distinct, edge, noise })
+    let (noise, slack) = (noise(&grid, normals, 1.0)?, slack(&grid, normals)?);
+    Ok(Cubes { grid, distinct, edge, noise, slack })
 }
 
 /// How many points of a cube do not coincide with the one before them.
@@ -70,11 +74,12 @@ fn distinct(points: &[Placed]) -> u32 {
     1 + points.windows(2).filter(|two| two[0].local != two[1].local).count() as u32
 }
 
+/// Bricks to look at: their cubes are enough for a median.
+const BRICKS: usize = 64;
+
 /// How far points lie off their surface, in edges: the deviation that half of some cubes do not exceed. The cubes are those of
 /// some bricks, or `scale` times as large, as many as fit into a brick.
 fn noise(grid: &Grid, normals: &[Vec3], scale: f32) -> Result<f32, Error> {
-    /// Bricks to look at: their cubes are enough for a median.
-    const BRICKS: usize = 64;
     let along = (BRICK as f32 / scale) as usize;
     let (mut cubes, mut gaps, mut deviations) = (vec![Vec::new(); along.pow(3)], Vec::new(), Vec::new());
     for brick in spread(grid.bricks.len(), BRICKS) {
@@ -95,6 +100,33 @@ fn noise(grid: &Grid, normals: &[Vec3], scale: f32) -> Result<f32, Error> {
     }
     // In edges of the cubes looked at.
     Ok(median(&deviations) / scale)
+}
+
+/// How far points next to each other lie off a common sheet, in edges: the median that half of some cubes do not exceed.
+fn slack(grid: &Grid, normals: &[Vec3]) -> Result<f32, Error> {
+    let (mut of_cubes, mut of_points) = (Vec::new(), Vec::new());
+    for brick in spread(grid.bricks.len(), BRICKS) {
+        for (points, _) in grid.cubes_of(brick) {
+            of_points.clear();
+            grow(&mut of_points, points.len(), WHAT)?;
+            for two in points.windows(2) {
+                let [one, other] = [0, 1].map(|i| normals[two[i].point as usize]);
+                if are_alike(one, other) {
+                    of_points.push(off_sheet(two[1].local - two[0].local, one, other).abs());
+                }
+            }
+            if of_points.len() >= LEAST {
+                of_cubes.push(median(&of_points));
+            }
+        }
+    }
+    Ok(median(&of_cubes))
+}
+
+/// How far two points, so far from each other, lie off a sheet that goes through both as their normals say: what lies between
+/// two points of an evenly bent one is across the mean of their normals.
+fn off_sheet(between: Vec3, one: Vec3, other: Vec3) -> f32 {
+    0.5 * between.dot(one + aligned(other, one))
 }
 
 /// Fewer points lie on a plane in any case.

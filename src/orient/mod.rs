@@ -133,7 +133,7 @@ fn surfaces(
     stage: &Stage,
 ) -> Result<Surfaces, Error> {
     let mut cubes = cubes::sort(points, normals, bounds, density, &stage.part(0.0..0.35))?;
-    let (patches, members) = Patches::of(&cubes.grid, normals, cubes.noise, &stage.part(0.35..0.5))?;
+    let (patches, members) = Patches::of(&cubes.grid, normals, [cubes.noise, cubes.slack], &stage.part(0.35..0.5))?;
     // Half of all the memory, and only its order is needed from here on.
     cubes.grid.placed = Vec::new();
     let Cubes { grid, distinct, noise, .. } = &cubes;

@@ -49,7 +49,7 @@ impl Patch {
 
     /// The variance of its points about its plane; `noise` is theirs, in edges.
     pub fn variance(&self, noise: f32) -> f32 {
-        Limits::of(noise).uneven * (1.0 / self.flatness - 1.0)
+        uneven(noise) * (1.0 / self.flatness - 1.0)
     }
 }
 
@@ -116,8 +116,8 @@ const DEVIATIONS: f32 = 2.2;
 const UNEVEN: f32 = 0.04;
 const UNEVEN_DEVIATIONS: f32 = 4.0;
 
-/// With less noise, in edges, there is none: some is always found where surfaces bend.
-const EXACT: f32 = 0.0075;
+/// Where points lie off common sheets by less than this, in edges, there is no noise.
+const EXACT: f32 = 0.001;
 
 /// Patches less alike than so, as those of the two faces of an edge, are no rivals.
 const UNLIKE: f32 = 0.1;
@@ -138,20 +138,19 @@ struct Limits {
     cosine_squared: f32,
     /// The variance at which the patch is half as flat.
     uneven: f32,
-    /// Whether there is none, so that places and normals may tell sheets that nearly touch.
-    is_exact: bool,
+    /// Where there is no noise, so that places and normals may tell sheets that nearly touch: how far points lie off their own.
+    slack: Option<f32>,
 }
 
 impl Limits {
-    /// Where points lie so far off their surface.
-    fn of(noise: f32) -> Self {
-        let uneven = UNEVEN.max(UNEVEN_DEVIATIONS * noise);
+    /// Where points lie so far off their surface, and off a sheet through one next to them.
+    fn of(noise: f32, slack: f32) -> Self {
         let cosine_squared = COSINE_SQUARED + (noise / NOISE).min(1.0) * (COSINE_SQUARED_IN_NOISE - COSINE_SQUARED);
         Self {
             thickness: THICKNESS.max(DEVIATIONS * noise),
             cosine_squared,
-            uneven: uneven * uneven,
-            is_exact: noise < EXACT,
+            uneven: uneven(noise),
+            slack: Some(slack).filter(|&slack| slack < EXACT),
         }
     }
 
@@ -161,11 +160,21 @@ impl Limits {
     }
 }
 
+/// The variance at which a patch is half as flat, where points lie so far off their surface.
+fn uneven(noise: f32) -> f32 {
+    UNEVEN.max(UNEVEN_DEVIATIONS * noise).powi(2)
+}
+
 impl Patches {
-    /// One pass over the points; `noise` is theirs, in edges.
-    pub fn of(grid: &Grid, normals: &[Vec3], noise: f32, stage: &Stage) -> Result<(Self, Members), Error> {
+    /// One pass over the points; `noise` is theirs and `slack` how far they lie off common sheets, both in edges.
+    pub fn of(
+        grid: &Grid,
+        normals: &[Vec3],
+        [noise, slack]: [f32; 2],
+        stage: &Stage,
+    ) -> Result<(Self, Members), Error> {
         const WHAT: &str = "the patches";
-        let limits = Limits::of(noise);
+        let limits = Limits::of(noise, slack);
         let (numbers, of_point) = (Filling::new(grid.placed.len(), WHAT)?, Filling::new(grid.placed.len(), WHAT)?);
         let counts = Filling::<u32>::new(grid.cubes(), WHAT)?;
         let found = stage.collect(grid.blocks.len(), WHAT, &|block| {
@@ -235,13 +244,18 @@ fn split(
 ) {
     let first = patches.len();
     if let Some((patch, doubt)) = whole(points, normals, centre, limits) {
-        if limits.is_exact && doubt.is_some() && part(points, normals, centre, limits, patches, of_point) {
+        if limits.slack.is_some_and(|slack| doubt.is_some(slack))
+            && part(points, normals, centre, limits, patches, of_point)
+        {
             return;
         }
         patches.push(patch);
         for (membership, &normal) in of_point.iter_mut().zip(normals) {
             membership.write(Membership::new(0, patch.normal.dot(normal) < 0.0));
         }
+        return;
+    }
+    if part(points, normals, centre, limits, patches, of_point) {
         return;
     }
     // By place, so that the order of the input does not matter.
@@ -262,9 +276,6 @@ fn split(
         let (number, is_opposite) = sums.add(points[i].local - centre, normals[i], limits);
         of_point[i].write(Membership::new(number, is_opposite));
         *number_or_key = number as u64;
-    }
-    if limits.is_exact && sums.count == 1 && part(points, normals, centre, limits, patches, of_point) {
-        return;
     }
     patches.extend((0..sums.count).map(|number| sums.patch(number)));
     let own = &mut patches[first..];
@@ -299,7 +310,7 @@ fn whole(points: &[Placed], normals: &[Vec3], centre: Vec3, limits: Limits) -> O
         }
         let square = (off * off).to_array();
         square[..points.len()].iter().for_each(|square| squares += square);
-        if limits.is_exact {
+        if limits.slack.is_some() {
             let own = x * own_x + y * own_y + z * own_z;
             let own = Vec4::select(along.cmplt(Vec4::ZERO), -own, own);
             let heights = off.to_array().into_iter().zip(own.to_array());
@@ -311,7 +322,7 @@ fn whole(points: &[Placed], normals: &[Vec3], centre: Vec3, limits: Limits) -> O
     Some((Patch { centre: place - centre, normal, points: count, flatness, has_rival: false, bend: 0.0 }, doubt))
 }
 
-/// Parts the points of a cube into two sheets that nearly touch, if they lie on such.
+/// Parts the points of a cube into two sheets that nearly touch, if there is no noise and they lie on such.
 fn part(
     points: &[Placed],
     normals: &[Vec3],
@@ -320,8 +331,8 @@ fn part(
     patches: &mut Vec<Patch>,
     of_point: &mut [MaybeUninit<Membership>],
 ) -> bool {
-    let Some(normal) = alike(normals, limits) else { return false };
-    let second = sheets::second(points, normals, normal);
+    let (Some(slack), Some(normal)) = (limits.slack, alike(normals, limits)) else { return false };
+    let second = sheets::second(points, normals, normal, slack);
     if second == 0 {
         return false;
     }

@@ -12,11 +12,13 @@ use glam::{Vec3, Vec4};
 /// Cubes of more points are left to the limits of patches.
 const ROOM: usize = u64::BITS as usize;
 
-/// A sheet has so many points at least: two are always of one.
-const LEAST: u32 = 3;
+/// Points lie on two sheets that are so many times as far off a common one as others are, and at least this far, in edges:
+/// rounding leaves as much.
+const TIMES: f32 = 10.0;
+const APART: f32 = 0.0015;
 
-/// Twice how far two points lie off a common sheet, in edges and squared: less is no reason to look for two.
-const APART: f32 = 4e-4;
+/// A sheet has so many points at least: two are always of one, and next to a rim few are of none.
+const LEAST: u32 = 3;
 
 /// Off their own sheet points lie by less than this share of what they lie off the other one, both squared.
 const CLEAR: f32 = 0.25;
@@ -42,12 +44,16 @@ impl Doubt {
         self.off = [self.off[0] + off, self.off[1] + off * off];
     }
 
-    /// Whether there may be two sheets.
-    pub fn is_some(&self) -> bool {
-        const LEAST: f32 = 2e-4;
+    /// Whether there may be two sheets, where points lie so far off their own, in edges.
+    pub fn is_some(&self, slack: f32) -> bool {
         let Self { count, off } = *self;
-        count * off[1] - off[0] * off[0] > LEAST * count * count
+        count * off[1] - off[0] * off[0] > 0.5 * apart(slack) * count * count
     }
+}
+
+/// Twice how far two points on two sheets lie off a common one, in edges and squared.
+fn apart(slack: f32) -> f32 {
+    (2.0 * APART.max(TIMES * slack)).powi(2)
 }
 
 /// Four points, and their normals, all to one side.
@@ -69,9 +75,10 @@ impl Four {
     }
 }
 
-/// A bit for each point that is on the second of two sheets; none if these are not two. `normal` is about that of all points.
+/// A bit for each point that is on the second of two sheets; none if these are not two. `normal` is about that of all points, which
+/// lie so far off their own sheet, in edges.
 #[inline(never)]
-pub(super) fn second(points: &[Placed], normals: &[Vec3], normal: Vec3) -> u64 {
+pub(super) fn second(points: &[Placed], normals: &[Vec3], normal: Vec3, slack: f32) -> u64 {
     let count = points.len();
     if count > ROOM || (count as u32) < 2 * LEAST {
         return 0;
@@ -101,7 +108,7 @@ pub(super) fn second(points: &[Placed], normals: &[Vec3], normal: Vec3) -> u64 {
     let a = farthest(&|i| points[i].local.distance_squared(middle));
     let off_a = off(1 << a);
     let b = farthest(&|i| off_a[i]);
-    if off_a[b] < APART {
+    if off_a[b] < apart(slack) {
         return 0;
     }
     let off_b = off(1 << b);
@@ -150,7 +157,7 @@ mod tests {
             (Placed { local: Vec3::new(x, y, z), point: i as u32 }, Vec3::new(-by_x, -by_y, 1.0).normalize())
         });
         let (points, normals): (Vec<Placed>, Vec<Vec3>) = all.unzip();
-        second(&points, &normals, Vec3::Z)
+        second(&points, &normals, Vec3::Z, 1e-4)
     }
 
     #[test]
