@@ -53,6 +53,11 @@ impl Places {
         self.0[place / 36] |= 1 << (place % 36);
     }
 
+    /// All of them.
+    pub fn all(&self) -> impl Iterator<Item = usize> {
+        (0..).zip(self.0).flat_map(|(z, word)| set_bits(word).map(move |bit| 36 * z + bit as usize))
+    }
+
     /// Those that pass a test.
     #[inline(always)]
     pub fn filter(&self, mut test: impl FnMut(usize) -> bool) -> Self {

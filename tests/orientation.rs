@@ -364,19 +364,22 @@ fn a_row_of_touching_bodies_faces_outwards() {
 }
 
 /// Without noise the lines of the points where they touch are told apart however near the two balls are: lines that were fitted
-/// across the gap would make more of the deviation than is asked.
+/// across the gap would make more of the deviation than is asked. So are signs: with
+/// those of patches alone 23 in all would be wrong.
 #[test]
-fn two_balls_that_touch_have_lines_of_their_own_where_they_do() {
+fn two_balls_that_touch_have_normals_of_their_own_where_they_do() {
+    let mut wrong = 0.0;
     for seed in [11, 12, 13, 14, 15] {
         let balls = [(0, 1.0), (100, -1.0)];
         let both = joined(
             balls.map(|(other, side)| moved(sphere(40_000, seed + other), [0.48, 0.64, 0.6].map(|c| c * side), 1.0)),
         );
         let result = orient(&both.points, Orient::Consistent);
-        let right = share_right(&result.normals, &both.normals);
         let off = root_mean_square(&angles(&result.normals, &both.normals));
-        assert!(right > 0.999 && off < 0.18, "{seed}: {right}, {off} degrees");
+        assert!(off < 0.18, "{seed}: {off} degrees");
+        wrong += 80_000.0 * (1.0 - share_right(&result.normals, &both.normals));
     }
+    assert!(wrong < 15.5, "{wrong:.0}");
 }
 
 /// Between cubes that touch at an edge only there is a gap, but nothing to be seen through it.

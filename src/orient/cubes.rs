@@ -12,6 +12,9 @@ use crate::progress::Stage;
 use crate::source::Source;
 use glam::Vec3;
 
+/// Where points lie off common sheets by less than this, in edges, there is no noise.
+const EXACT: f32 = 0.001;
+
 /// What errors call the memory of all this.
 const WHAT: &str = "the cubes";
 
@@ -33,9 +36,9 @@ pub(super) struct Cubes {
     pub edge: f64,
     /// How far points lie off their surface, in edges.
     pub noise: f32,
-    /// How far points next to each other lie off a sheet that goes through both as their normals say, in edges: nothing where
-    /// there is no noise, however the surface bends.
-    pub slack: f32,
+    /// Where there is no noise, so that places and normals tell sheets that nearly touch: how far points next to each other lie
+    /// off a sheet that goes through both as their normals say, in edges; nothing but rounding, however the surface bends.
+    pub slack: Option<f32>,
 }
 
 /// Sorts the points once, noisy ones twice.
@@ -102,8 +105,9 @@ fn noise(grid: &Grid, normals: &[Vec3], scale: f32) -> Result<f32, Error> {
     Ok(median(&deviations) / scale)
 }
 
-/// How far points next to each other lie off a common sheet, in edges: the median that half of some cubes do not exceed.
-fn slack(grid: &Grid, normals: &[Vec3]) -> Result<f32, Error> {
+/// How far points next to each other lie off a common sheet, in edges, if that is next to nothing: the median that half of some
+/// cubes do not exceed.
+fn slack(grid: &Grid, normals: &[Vec3]) -> Result<Option<f32>, Error> {
     let (mut of_cubes, mut of_points) = (Vec::new(), Vec::new());
     for brick in spread(grid.bricks.len(), BRICKS) {
         for (points, _) in grid.cubes_of(brick) {
@@ -120,7 +124,7 @@ fn slack(grid: &Grid, normals: &[Vec3]) -> Result<f32, Error> {
             }
         }
     }
-    Ok(median(&of_cubes))
+    Ok(Some(median(&of_cubes)).filter(|&slack| slack < EXACT))
 }
 
 /// How far two points, so far from each other, lie off a sheet that goes through both as their normals say: what lies between

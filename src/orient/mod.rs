@@ -6,7 +6,8 @@
 //! these agree with best ([`groups`]), of open surfaces also what their parts see of each other ([`looks`]). These then face
 //! what stands before them ([`facing`]), or the scanner, if one saw all: where it stood, if densities tell that ([`station`]),
 //! or the direction from which it did ([`view`]), or several that stood amid them ([`stations`]). Of a few points that are no
-//! surface, what is round them tells the side ([`specks`]). In noise normals then become means of those about them ([`means`]).
+//! surface, what is round them tells the side ([`specks`]). In noise normals then become means of those about them ([`means`]),
+//! and without noise points are turned that stand in the patch of another surface ([`misfits`]).
 
 mod air;
 mod ball;
@@ -20,6 +21,7 @@ mod groups;
 mod links;
 mod looks;
 mod means;
+mod misfits;
 mod parted;
 mod patches;
 mod place;
@@ -133,7 +135,7 @@ fn surfaces(
     stage: &Stage,
 ) -> Result<Surfaces, Error> {
     let mut cubes = cubes::sort(points, normals, bounds, density, &stage.part(0.0..0.35))?;
-    let (patches, members) = Patches::of(&cubes.grid, normals, [cubes.noise, cubes.slack], &stage.part(0.35..0.5))?;
+    let (patches, members) = Patches::of(&cubes.grid, normals, (cubes.noise, cubes.slack), &stage.part(0.35..0.5))?;
     // Half of all the memory, and only its order is needed from here on.
     cubes.grid.placed = Vec::new();
     let Cubes { grid, distinct, noise, .. } = &cubes;
@@ -166,8 +168,9 @@ fn surfaces(
     let components = Components::of(&decisions)?;
     let of_point = turn(grid, &patches, &members, &signs, normals, options.components, &last.part(0.1..0.4))?;
     if options.method == Method::Bilinear && options.cell == Cell::Auto {
-        means::average(points, &cubes, (&patches, &members), &signs, normals, &last.part(0.4..1.0))?;
+        means::average(points, &cubes, (&patches, &members), &signs, normals, &last.part(0.4..0.8))?;
     }
+    misfits::turn(points, &cubes, (&patches, &members), &signs, normals, &last.part(0.8..1.0))?;
     last.tell(1.0)?;
     Ok(Surfaces { components, of_point })
 }

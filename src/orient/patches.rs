@@ -116,9 +116,6 @@ const DEVIATIONS: f32 = 2.2;
 const UNEVEN: f32 = 0.04;
 const UNEVEN_DEVIATIONS: f32 = 4.0;
 
-/// Where points lie off common sheets by less than this, in edges, there is no noise.
-const EXACT: f32 = 0.001;
-
 /// Patches less alike than so, as those of the two faces of an edge, are no rivals.
 const UNLIKE: f32 = 0.1;
 
@@ -143,15 +140,10 @@ struct Limits {
 }
 
 impl Limits {
-    /// Where points lie so far off their surface, and off a sheet through one next to them.
-    fn of(noise: f32, slack: f32) -> Self {
+    /// Where points lie so far off their surface, and, if there is no noise, off a sheet through one next to them.
+    fn of(noise: f32, slack: Option<f32>) -> Self {
         let cosine_squared = COSINE_SQUARED + (noise / NOISE).min(1.0) * (COSINE_SQUARED_IN_NOISE - COSINE_SQUARED);
-        Self {
-            thickness: THICKNESS.max(DEVIATIONS * noise),
-            cosine_squared,
-            uneven: uneven(noise),
-            slack: Some(slack).filter(|&slack| slack < EXACT),
-        }
+        Self { thickness: THICKNESS.max(DEVIATIONS * noise), cosine_squared, uneven: uneven(noise), slack }
     }
 
     /// The flatness of so many points, with the sum of their square distances from the plane.
@@ -166,11 +158,11 @@ fn uneven(noise: f32) -> f32 {
 }
 
 impl Patches {
-    /// One pass over the points; `noise` is theirs and `slack` how far they lie off common sheets, both in edges.
+    /// One pass over the points; `noise` is theirs, in edges, and `slack` as [`Cubes`](super::cubes::Cubes) has it.
     pub fn of(
         grid: &Grid,
         normals: &[Vec3],
-        [noise, slack]: [f32; 2],
+        (noise, slack): (f32, Option<f32>),
         stage: &Stage,
     ) -> Result<(Self, Members), Error> {
         const WHAT: &str = "the patches";

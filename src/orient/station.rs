@@ -367,7 +367,7 @@ mod tests {
         let stage = Progress::silent();
         let stage = stage.stage("test", 0.0..1.0);
         let (grid, _) = Grid::sort(&Source::new(&points, lattice), &stage, |_, _| ()).unwrap();
-        let (patches, _) = Patches::of(&grid, &vec![Vec3::Z; 160 * 160], [0.0; 2], &stage).unwrap();
+        let (patches, _) = Patches::of(&grid, &vec![Vec3::Z; 160 * 160], (0.0, Some(0.0)), &stage).unwrap();
         (grid, patches)
     }
 
