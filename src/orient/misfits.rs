@@ -6,7 +6,6 @@
 //! ([`super::sheets`]).
 
 use super::cubes::Cubes;
-use super::flip;
 use super::patches::{Members, Membership, Patches, aligned, signed};
 use super::signs::Signs;
 use crate::bricks::set_bits;
@@ -74,7 +73,8 @@ pub(super) fn turn(
             break;
         }
         for point in misfits.into_iter().flatten() {
-            normals[point as usize] = flip(normals[point as usize]);
+            // No negative zeros.
+            normals[point as usize] = Vec3::ZERO - normals[point as usize];
         }
     }
     Ok(())
