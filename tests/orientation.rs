@@ -364,8 +364,8 @@ fn a_row_of_touching_bodies_faces_outwards() {
 }
 
 /// Without noise the lines of the points where they touch are told apart however near the two balls are: lines that were fitted
-/// across the gap would make more of the deviation than is asked. So are signs: with
-/// those of patches alone 23 in all would be wrong.
+/// across the gap would make more of the deviation than is asked. So are signs: by
+/// patches alone 23 in all were wrong.
 #[test]
 fn two_balls_that_touch_have_normals_of_their_own_where_they_do() {
     let mut wrong = 0.0;

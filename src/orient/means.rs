@@ -13,7 +13,7 @@
 //! (2024)).
 
 use super::cubes::Cubes;
-use super::patches::{Members, Patch, Patches, signed};
+use super::patches::{Members, Patch, Patches};
 use super::signs::Signs;
 use super::support::Support;
 use crate::bricks::set_bits;
@@ -77,7 +77,7 @@ pub(super) fn average(
     if *noise <= LEAST_NOISE {
         return Ok(());
     }
-    let facing = |patch: usize| signed(signs.flipped[patch], patches.all[patch].normal);
+    let facing = |patch: usize| signs.facing(patches, patch);
     let known: &[Vec3] = normals;
     let found = stage.part(0.0..0.9).collect(grid.blocks.len(), WHAT, &|block| {
         let mut surroundings = Surroundings::new();

@@ -6,7 +6,7 @@
 //! ([`super::sheets`]).
 
 use super::cubes::Cubes;
-use super::patches::{Members, Membership, Patches, aligned, signed};
+use super::patches::{Members, Membership, Patches, aligned};
 use super::signs::Signs;
 use crate::bricks::set_bits;
 use crate::error::Error;
@@ -101,7 +101,7 @@ impl Cloud<'_> {
             for brick in grid.blocks[block].clone() {
                 surroundings.look(grid, brick);
                 let all = surroundings.occupied.all().flat_map(|place| self.patches.of_cube(surroundings.cube(place)));
-                let mut facing = all.map(|patch| self.facing(patch));
+                let mut facing = all.map(|patch| self.signs.facing(self.patches, patch));
                 let Some(one) = facing.next() else { continue };
                 if facing.all(|other| one.dot(other) >= HALF_APART) {
                     continue;
@@ -120,14 +120,17 @@ impl Cloud<'_> {
         let Found { own, near, misfits } = found;
         let near_bits = surroundings.occupied.near(bit);
         let cubes = || set_bits(near_bits).map(|near| surroundings.cube(Places::of_near(bit, near)));
-        let others = || cubes().flat_map(|cube| patches.of_cube(cube)).map(|other| self.facing(other));
+        let others = || cubes().flat_map(|cube| patches.of_cube(cube)).map(|other| self.signs.facing(patches, other));
         let is_torn = |facing: Vec3| others().any(|other| facing.dot(other) < APART);
         near.clear();
         for (number, patch) in patches.of_cube(cube).enumerate() {
-            let facing = self.facing(patch);
-            let count = cubes().map(|cube| grid.points_of(cube).len()).sum();
-            if !is_torn(facing) || count > MOST {
+            let facing = self.signs.facing(patches, patch);
+            if !is_torn(facing) {
                 continue;
+            }
+            let count = cubes().map(|cube| grid.points_of(cube).len()).sum();
+            if count > MOST {
+                return Ok(());
             }
             let Some((first, _)) = members.of_cube(grid, cube).next() else { continue };
             let is_own = |membership: Membership| membership.patch().is_some_and(|(own, _)| own == number);
@@ -145,11 +148,6 @@ impl Cloud<'_> {
             misfits.extend(own.iter().filter(|(_, one)| one.is_misfit(near)).map(|&(point, _)| point));
         }
         Ok(())
-    }
-
-    /// The side to which a patch faces.
-    fn facing(&self, patch: usize) -> Vec3 {
-        signed(self.signs.flipped[patch], self.patches.all[patch].normal)
     }
 
     /// A point, as it lies to one near by: so differences are exact, and in edges squares are numbers, whatever the unit.
@@ -219,7 +217,7 @@ impl Nearest {
     fn add(&mut self, square: f32, off: f32) {
         let mut one = (square, off);
         for other in &mut self.0 {
-            // Of two that coincide one speaks.
+            // Of those that lie alike, as copies do, one speaks.
             if one == *other {
                 return;
             }

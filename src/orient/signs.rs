@@ -9,6 +9,7 @@ use super::patches::{Patches, signed};
 use crate::error::Error;
 use crate::lists::{filled, fitted};
 use crate::progress::Stage;
+use glam::Vec3;
 
 /// What errors call the memory of all this.
 const WHAT: &str = "the signs";
@@ -20,6 +21,13 @@ pub(super) struct Signs {
     /// For each patch the number of its component.
     pub component: Vec<u32>,
     pub components: usize,
+}
+
+impl Signs {
+    /// The normal of a patch, to the side that it faces.
+    pub fn facing(&self, patches: &Patches, patch: usize) -> Vec3 {
+        signed(self.flipped[patch], patches.all[patch].normal)
+    }
 }
 
 /// A surface that sees so much more of the open on one side than on the other is closed. Rooms from inside have 0.3; an aerial

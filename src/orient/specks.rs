@@ -1,7 +1,7 @@
 //! Components of a few points, which are no surfaces: slivers seen past an edge, points on a sharp one.
 
 use super::components::Decision;
-use super::patches::{Patches, signed};
+use super::patches::Patches;
 use super::signs::Signs;
 use crate::error::Error;
 use crate::grid::Grid;
@@ -92,7 +92,7 @@ fn ask_around(
         if square > REACH * REACH || is_speck(other) {
             return;
         }
-        let facing = signed(signs.flipped[other], patches.all[other].normal);
+        let facing = signs.facing(patches, other);
         let reflected = normal.dot(facing) - 2.0 * line.dot(normal) * line.dot(facing) / square;
         agreement += reflected * patches.all[other].points as f32 / square;
         if nearest.is_none_or(|(least, _)| square < least) {
