@@ -118,8 +118,8 @@ fn every_cloud_ends_in_unit_or_zero_vectors() {
     }
 }
 
-/// Signs change signs only, whatever the cloud, unless with `'auto'` they let normals be averaged in noise and narrow faces have
-/// their own; progress rises from 0 to 1, and every point is in one component or in none.
+/// Signs change signs only, whatever the cloud, unless with `'auto'` they let normals be averaged in noise, and narrow faces and
+/// points next to edges have their own; progress rises from 0 to 1, and every point is in one component or in none.
 #[test]
 fn every_cloud_can_be_oriented() {
     use std::cell::Cell as Heard;
@@ -247,6 +247,7 @@ fn the_same_bits_for_any_number_of_threads() {
         (with_spoilt(300_000), cells(&[Cell::Auto, Cell::Scale(1.0), Cell::Size(0.05)])),
         (cube(200_000, 20).noisy(0.003, 21).points, cells(&[Cell::Auto])),
         (with_spoilt(100_000), baselines(&[None])),
+        (cube(100_000, 24).points, vec![Options { orient: Orient::Consistent, ..Options::default() }]),
         (
             cube(200_000, 22).noisy(0.006, 23).points,
             [Orient::Consistent, Orient::Outward, Orient::Viewpoint([3.0, 1.0, 2.0]), Orient::Up([0.0, 1.0, 0.0])]

@@ -1298,7 +1298,8 @@ fn is_same_line(oriented: &[f32], plain: &[f32]) -> bool {
 
 #[test]
 fn only_signs_change() {
-    let (smooth, noisy) = (torus(30_000, 22), cube(30_000, 22).noisy(0.006, 7));
+    // So many points that it hardly bends from one cube to the next.
+    let (smooth, noisy) = (torus(100_000, 22), cube(30_000, 22).noisy(0.006, 7));
     let (up, viewpoint) = (Orient::Up([1.0, 0.0, 0.0]), Orient::Viewpoint([9.0, 0.0, 0.0]));
     let fixed = Options { cell: Cell::Scale(1.5), ..Options::default() };
     let knn = Options { method: Method::Knn, ..Options::default() };
@@ -1340,6 +1341,35 @@ fn narrow_faces_have_their_own_normals() {
     let [plain, oriented] = [Orient::None, Orient::Consistent].map(|how| orient(&noisy.points, how).normals);
     let mut pairs = oriented.chunks_exact(3).zip(plain.chunks_exact(3));
     assert!(pairs.all(|(a, b)| is_same_line(a, b)));
+}
+
+/// Next to an edge the faces beyond have a say in the line, but what lies on a face tells of it there: of a star with tips of 34
+/// degrees and of a cylinder lines were 0.39 and 0.25 degrees off without that.
+#[test]
+fn points_next_to_edges_have_the_normals_of_their_faces() {
+    for (name, polygon) in [("star", star(6, 0.4)), ("cylinder", star(5000, 1.0))] {
+        let cloud = prism(60_000, 25, &polygon, 0.4);
+        let normals = orient(&cloud.points, Orient::Consistent).normals;
+        let off = root_mean_square(&angles(&normals, &cloud.normals));
+        assert!(off < 0.1, "{name}: {off} degrees");
+        assert_eq!(share_right(&normals, &cloud.normals), 1.0, "{name}");
+        for exponent in [-60, 60] {
+            let scaled: Vec<f32> = cloud.points.iter().map(|c| c * 2f32.powi(exponent)).collect();
+            assert!(orient(&scaled, Orient::Consistent).normals == normals, "{name}: 2^{exponent}");
+        }
+    }
+}
+
+/// The same where a smooth surface bends by 37 degrees within a few cubes.
+#[test]
+fn on_small_round_bodies_lines_change_for_the_better() {
+    for cloud in [torus(10_000, 22), torus(3000, 22), sphere(1000, 1)] {
+        let [plain, oriented] = [Orient::None, Orient::Consistent].map(|how| orient(&cloud.points, how).normals);
+        let mut pairs = oriented.chunks_exact(3).zip(plain.chunks_exact(3));
+        assert!(pairs.any(|(a, b)| !is_same_line(a, b)));
+        let [before, after] = [plain, oriented].map(|normals| root_mean_square(&angles(&normals, &cloud.normals)));
+        assert!(after < before, "{after} degrees, {before} before");
+    }
 }
 
 /// Within the noise of an edge of 60 degrees, and on a bar six deviations thick, a normal may be that of a face beyond, whose

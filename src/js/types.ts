@@ -48,10 +48,10 @@ export interface EstimateOptions {
    * what it touches, or away from its middle, and if it is flat `x + 2y + 4z >= 0` for its mean normal; what one
    * scanner saw from one place, or a few from amid it, faces them. `'outward'`: the same, but never to what stands
    * before it, nor to a scanner: for objects, also with holes. Both also average normals, with `cell: 'auto'`, where
-   * surfaces face apart within the noise, as at edges and on rods, and give the narrow sides of ribs and grooves
-   * without noise the planes that their points lie on: elsewhere only signs change. `viewpoint`: towards a position,
-   * in the coordinates of `positions`. `up`: towards a direction of any length but 0, for terrain. Both are arrays of
-   * three finite numbers.
+   * surfaces face apart within the noise, as at edges and on rods, and without noise give the narrow sides of ribs and
+   * grooves the planes that their points lie on, and points next to edges the normals of their faces: elsewhere only
+   * signs change. `viewpoint`: towards a position, in the coordinates of `positions`. `up`: towards a direction of any
+   * length but 0, for terrain. Both are arrays of three finite numbers.
    */
   orient?:
     'none' | 'consistent' | 'outward' | { viewpoint: [number, number, number] } | { up: [number, number, number] };

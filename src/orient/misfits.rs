@@ -1,17 +1,18 @@
-//! Points in the patch of a surface that they are not on, in clouds without noise, once surfaces have signs.
+//! Points with the normal of a surface that they are not on, in clouds without noise, once surfaces have signs.
 //!
-//! Of two surfaces that nearly touch, or meet at a sharp edge, a cube may hold too few points of one for a patch of their own: they
-//! join that of the other one, or are so few that nothing tells which side they face. Where the two face apart, each point is asked
-//! here on which it lies. On one sheet, if it bends evenly, what lies between two points is across the mean of their normals
-//! ([`super::sheets`]).
+//! Of two surfaces that nearly touch, or meet at an edge, a cube may hold too few points of one for a patch of their own: they join
+//! that of the other one, or are so few that nothing tells which side they face. And next to an edge a point may have the line of the
+//! face beyond, or one between the two. Where surfaces face apart, each point is asked here on which it lies, by the points next to
+//! it ([`super::fits`]).
 
 use super::cubes::Cubes;
-use super::patches::{Members, Membership, Patches, aligned};
+use super::fits::{ALIKE, Fits, Oriented, REACH, SOFT};
+use super::patches::{Members, Membership, Patches};
 use super::signs::Signs;
 use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::grid::Grid;
-use crate::lists::grow;
+use crate::lists::{filled, grow};
 use crate::points::Points;
 use crate::progress::Stage;
 use crate::surroundings::{Places, Surroundings};
@@ -20,61 +21,78 @@ use glam::Vec3;
 /// What errors call the memory of all this.
 const WHAT: &str = "the misfits";
 
-/// Patches face apart if the cosine is less, 120 degrees and more; so do none if all are within half of that of one.
-const APART: f32 = -0.5;
-const HALF_APART: f32 = 0.5;
+/// Patches face apart if the cosine is less, 37 degrees and more; so do none if all are within half of that of one.
+const APART: f32 = 0.8;
+const HALF_APART: f32 = 0.95;
 
-/// Points are in doubt whose [`Oriented::off`] from the mean of their patch is so much more or less than that of the others, and
-/// those of patches of fewer.
+/// Points are in doubt whose [`Oriented::off`] from the mean of their patch is so much more or less than that of the others, those
+/// that lie no further off the plane of a patch that faces apart, within an edge, and those of patches of fewer.
 const DOUBT: f32 = 0.006;
 const FEW: usize = 4;
 
-/// Points are of one sheet, whichever way that faces, where the cosine of their normals is more.
-const ALIKE: f32 = 0.7;
+/// But their lines are right where those next to one lie off its sheet by less than half this share of how far away they are,
+/// squared, and what differs by less, squared, is no other line.
+const RIGHT: f32 = 1e-9;
+const SAME: f32 = 1e-7;
 
-/// How many points on either side tell on which sheet one is: the nearest, up to so far away, in edges and squared.
+/// How many points on either side tell on which sheet one is: the nearest.
 const NEAREST: usize = 4;
-const REACH: f32 = 2.25;
-
-/// Added to the square of that distance: between two that nearly coincide lies nothing but rounding.
-const SOFT: f32 = 0.001;
 
 /// They tell if on average it lies off the one sheet by less than this share of what it lies off the other one, both squared, and
 /// by no more than a sixth of how far away they are.
 const CLEAR: f32 = 0.25;
 const ON: f32 = 0.1;
 
-/// How often points may turn: what others say of one may be wrong itself, and right in the next round.
+/// How often points are asked: what others say of one may be wrong itself, and right in the next round.
 const ROUNDS: usize = 4;
+
+/// Where more than one in so many points got another line edges are everywhere, and another round would find as many.
+const TANGLE: usize = 50;
 
 /// Where more points are near, none is asked: each looks at all of them.
 const MOST: usize = 2048;
 
 /// Turns the normals, which have their signs, of points that lie on the sheet of points that face the other way, and not on that of
-/// those which face as they do; only where there is no noise. Up to [`ROUNDS`] passes over the patches; where those about a cube
-/// face apart, each doubtful point of it looks at the points of the 27 cubes.
-pub(super) fn turn(
+/// those which face as they do; only where there is no noise. If lines may change, points that are on another sheet get the normal
+/// of that. Up to [`ROUNDS`] passes over the patches; where those about a cube face apart, each
+/// doubtful point of it looks at the points of the 27 cubes.
+pub(super) fn mend(
     points: &Points,
     cubes: &Cubes,
     (patches, members): (&Patches, &Members),
     signs: &Signs,
+    lines_may_change: bool,
     normals: &mut [Vec3],
     stage: &Stage,
 ) -> Result<(), Error> {
     if cubes.slack.is_none() {
         return Ok(());
     }
+    let (grid, per_edge) = (&cubes.grid, (1.0 / cubes.edge) as f32);
+    let mut is_stirred = filled(true, grid.cubes(), WHAT)?;
     for round in 0..ROUNDS {
         let share = |rounds: usize| rounds as f64 / ROUNDS as f64;
-        let cloud =
-            Cloud { points, normals, per_edge: (1.0 / cubes.edge) as f32, grid: &cubes.grid, patches, members, signs };
+        let cloud = Cloud {
+            points,
+            normals,
+            per_edge,
+            grid,
+            patches,
+            members,
+            signs,
+            lines_may_change,
+            is_stirred: &is_stirred,
+        };
         let misfits = cloud.misfits(&stage.part(share(round)..share(round + 1)))?;
-        if misfits.iter().all(Vec::is_empty) {
-            break;
-        }
-        for point in misfits.into_iter().flatten() {
+        is_stirred.fill(false);
+        for misfit in misfits.iter().flatten() {
             // No negative zeros.
-            normals[point as usize] = Vec3::ZERO - normals[point as usize];
+            normals[misfit.point as usize] = Vec3::ZERO + misfit.normal;
+            is_stirred[misfit.cube as usize] = true;
+        }
+        let all = || misfits.iter().flatten();
+        if all().next().is_none() || TANGLE * all().filter(|misfit| misfit.is_line).count() > normals.len() {
+            break;
         }
     }
     Ok(())
@@ -90,16 +108,22 @@ struct Cloud<'a> {
     patches: &'a Patches,
     members: &'a Members,
     signs: &'a Signs,
+    lines_may_change: bool,
+    /// For each cube whether normals of its points changed in the round before.
+    is_stirred: &'a [bool],
 }
 
 impl Cloud<'_> {
     /// The misfits of each block.
-    fn misfits(&self, stage: &Stage) -> Result<Vec<Vec<u32>>, Error> {
+    fn misfits(&self, stage: &Stage) -> Result<Vec<Vec<Misfit>>, Error> {
         let grid = self.grid;
         stage.collect(grid.blocks.len(), WHAT, &|block| {
             let (mut surroundings, mut found) = (Surroundings::new(), Found::default());
             for brick in grid.blocks[block].clone() {
                 surroundings.look(grid, brick);
+                if !surroundings.occupied.all().any(|place| self.is_stirred[surroundings.cube(place)]) {
+                    continue;
+                }
                 let all = surroundings.occupied.all().flat_map(|place| self.patches.of_cube(surroundings.cube(place)));
                 let mut facing = all.map(|patch| self.signs.facing(self.patches, patch));
                 let Some(one) = facing.next() else { continue };
@@ -117,15 +141,25 @@ impl Cloud<'_> {
     /// Finds the misfits of a cube, which has a bit in its brick.
     fn ask(&self, (cube, bit): (usize, u32), surroundings: &Surroundings, found: &mut Found) -> Result<(), Error> {
         let Self { grid, patches, members, .. } = *self;
-        let Found { own, near, misfits } = found;
+        let Found { own, near, planes, fits, misfits } = found;
         let near_bits = surroundings.occupied.near(bit);
-        let cubes = || set_bits(near_bits).map(|near| surroundings.cube(Places::of_near(bit, near)));
-        let others = || cubes().flat_map(|cube| patches.of_cube(cube)).map(|other| self.signs.facing(patches, other));
-        let is_torn = |facing: Vec3| others().any(|other| facing.dot(other) < APART);
+        let places = || set_bits(near_bits).map(|near| Places::of_near(bit, near));
+        let cubes = || places().map(|place| surroundings.cube(place));
+        if !cubes().any(|cube| self.is_stirred[cube]) {
+            return Ok(());
+        }
         near.clear();
         for (number, patch) in patches.of_cube(cube).enumerate() {
             let facing = self.signs.facing(patches, patch);
-            if !is_torn(facing) {
+            planes.clear();
+            for (place, cube) in places().zip(cubes()) {
+                let centre = |other: usize| Places::centre(place) + patches.all[other].centre;
+                let all = patches.of_cube(cube).map(|other| (other, self.signs.facing(patches, other)));
+                let apart = all.filter(|(_, other)| facing.dot(*other) < APART);
+                grow(planes, patches.of_cube(cube).len(), WHAT)?;
+                planes.extend(apart.map(|(other, facing)| Oriented { place: centre(other), facing }));
+            }
+            if planes.is_empty() {
                 continue;
             }
             let count = cubes().map(|cube| grid.points_of(cube).len()).sum();
@@ -138,14 +172,19 @@ impl Cloud<'_> {
             grow(own, grid.points_of(cube).len(), WHAT)?;
             let all = members.of_cube(grid, cube).filter(|&(_, membership)| is_own(membership));
             own.extend(all.map(|(point, _)| (point as u32, self.oriented(point, first))));
-            keep_doubtful(own, facing);
+            keep_doubtful(own, facing, Places::centre(Places::of_cube(bit)) + patches.all[patch].centre, planes);
             if near.is_empty() && !own.is_empty() {
                 grow(near, count, WHAT)?;
                 let all = cubes().flat_map(|cube| members.of_cube(grid, cube));
                 near.extend(all.map(|(point, _)| self.oriented(point, first)));
             }
             grow(misfits, own.len(), WHAT)?;
-            misfits.extend(own.iter().filter(|(_, one)| one.is_misfit(near)).map(|&(point, _)| point));
+            for (point, one) in &*own {
+                let fits = self.lines_may_change.then_some(&mut *fits);
+                if let Some((normal, is_line)) = better(one, near, fits)? {
+                    misfits.push(Misfit { cube: cube as u32, point: *point, normal, is_line });
+                }
+            }
         }
         Ok(())
     }
@@ -164,12 +203,23 @@ struct Found {
     own: Vec<(u32, Oriented)>,
     /// All of the 27 cubes, if they were asked for.
     near: Vec<Oriented>,
-    /// The numbers of those that are to turn.
-    misfits: Vec<u32>,
+    /// The patches of these that face apart from that one: their middles, in the brick, in edges, and which way they face.
+    planes: Vec<Oriented>,
+    fits: Fits,
+    misfits: Vec<Misfit>,
 }
 
-/// Keeps those of the points of a patch that lie off it, or all if they are few.
-fn keep_doubtful(points: &mut Vec<(u32, Oriented)>, facing: Vec3) {
+/// A point that is on another sheet, and its normal there.
+struct Misfit {
+    cube: u32,
+    point: u32,
+    normal: Vec3,
+    /// Whether its line is another one, too.
+    is_line: bool,
+}
+
+/// Keeps those of the points of a patch, which has its middle there, that lie off it, or on a plane of others; all if they are few.
+fn keep_doubtful(points: &mut Vec<(u32, Oriented)>, facing: Vec3, middle: Vec3, planes: &[Oriented]) {
     if points.len() < FEW {
         return;
     }
@@ -177,35 +227,39 @@ fn keep_doubtful(points: &mut Vec<(u32, Oriented)>, facing: Vec3) {
     let mean = Oriented { place: share * points.iter().map(|(_, one)| one.place).sum::<Vec3>(), facing };
     // Where it bends, all lie off a sheet through the mean.
     let bend = share * points.iter().map(|(_, one)| one.off(&mean)).sum::<f32>();
-    points.retain(|(_, one)| (one.off(&mean) - bend).abs() >= DOUBT);
+    let is_on = |plane: &Oriented, place: Vec3| {
+        let offset = place - plane.place;
+        offset.dot(plane.facing).abs() < DOUBT && offset.length_squared() < 1.0
+    };
+    points.retain(|(_, one)| {
+        let place = middle + (one.place - mean.place);
+        (one.off(&mean) - bend).abs() >= DOUBT || planes.iter().any(|plane| is_on(plane, place))
+    });
 }
 
-/// An oriented point, or the mean of some: where it is, in edges, and its normal.
-struct Oriented {
-    place: Vec3,
-    facing: Vec3,
-}
-
-impl Oriented {
-    /// Twice how far another one lies off a sheet that goes through both, in edges; that may face the other way there.
-    fn off(&self, other: &Self) -> f32 {
-        (other.place - self.place).dot(self.facing + aligned(other.facing, self.facing))
-    }
-
-    /// Whether it is not on the sheet of the points near by that face as it does, but on that of those which face the other way.
-    fn is_misfit(&self, near: &[Self]) -> bool {
-        let (mut same, mut opposite) = (Nearest::NONE, Nearest::NONE);
-        for other in near {
-            let square = other.place.distance_squared(self.place);
-            let along = self.facing.dot(other.facing);
-            // Nothing lies between two that coincide, as it does with itself.
-            if along.abs() >= ALIKE && square <= REACH && square > 0.0 {
-                let side = if along < 0.0 { &mut opposite } else { &mut same };
-                side.add(square, self.off(other).powi(2) / (square + SOFT));
+/// The normal of the sheet that a point lies on, of those of the points near by, if it is not on that of those which face as it
+/// does: the opposite of its own, if it is on that of those which face the other way, or by [`Fits`] whatever fits better, and then
+/// `true`.
+fn better(one: &Oriented, near: &[Oriented], fits: Option<&mut Fits>) -> Result<Option<(Vec3, bool)>, Error> {
+    let (mut same, mut opposite) = (Nearest::NONE, Nearest::NONE);
+    for other in near {
+        let square = other.place.distance_squared(one.place);
+        let along = one.facing.dot(other.facing);
+        // Nothing lies between two that coincide, as it does with itself.
+        if along.abs() >= ALIKE && square <= REACH && square > 0.0 {
+            let side = if along < 0.0 { &mut opposite } else { &mut same };
+            if side.has_room(square) {
+                side.add(square, one.off(other).powi(2) / (square + SOFT));
             }
         }
-        opposite.mean() < ON.min(CLEAR * same.mean())
     }
+    let (own, limit) = (same.mean(), ON.min(CLEAR * same.mean()));
+    if opposite.mean() < limit {
+        return Ok(Some((-one.facing, false)));
+    }
+    let Some(fits) = fits.filter(|_| own >= RIGHT) else { return Ok(None) };
+    let normal = fits.normal(one, near, limit)?;
+    Ok(normal.filter(|normal| normal.distance_squared(one.facing) > SAME).map(|normal| (normal, true)))
 }
 
 /// The nearest of some points: the square of how far away they are, and of how far they lie off a sheet, as a share of that.
@@ -213,6 +267,11 @@ struct Nearest([(f32, f32); NEAREST]);
 
 impl Nearest {
     const NONE: Self = Self([(f32::INFINITY, f32::INFINITY); NEAREST]);
+
+    /// Whether one so far away is among them.
+    fn has_room(&self, square: f32) -> bool {
+        square <= self.0[NEAREST - 1].0
+    }
 
     fn add(&mut self, square: f32, off: f32) {
         let mut one = (square, off);
@@ -256,9 +315,14 @@ mod tests {
         let some: Vec<usize> = (0..points.len()).filter(|&i| near_the_touch(&points[i])).collect();
         assert!(some.len() >= 3, "{}", some.len());
         for i in some {
-            assert!(!points[i].is_misfit(&points), "{:?}", points[i].place);
+            assert_eq!(better(&points[i], &points, None), Ok(None), "{:?}", points[i].place);
             points[i].facing = -points[i].facing;
-            assert!(points[i].is_misfit(&points), "{:?}", points[i].place);
+            assert_eq!(
+                better(&points[i], &points, None),
+                Ok(Some((-points[i].facing, false))),
+                "{:?}",
+                points[i].place
+            );
             points[i].facing = -points[i].facing;
         }
     }
@@ -266,17 +330,22 @@ mod tests {
     #[test]
     fn nothing_is_a_misfit_of_one_sheet() {
         let upper: Vec<Oriented> = bowls().into_iter().step_by(2).collect();
-        assert!(upper.iter().all(|one| !one.is_misfit(&upper)));
+        assert!(upper.iter().all(|one| better(one, &upper, None) == Ok(None)));
+        // Nor do lines change that are right but for rounding.
+        let mut fits = Fits::default();
+        assert!(upper.iter().all(|one| {
+            better(one, &upper, Some(&mut fits))
+                .is_ok_and(|found| found.is_none_or(|(normal, _)| normal.dot(one.facing) > 0.9999))
+        }));
     }
 
     /// Nor where nothing faces as it does, if it is before or behind the others.
     #[test]
     fn a_point_off_a_sheet_is_no_misfit_of_it() {
         let upper: Vec<Oriented> = bowls().into_iter().step_by(2).collect();
-        for height in [0.5, -0.5] {
-            assert!(!Oriented { place: Vec3::new(0.1, 0.0, height), facing: Vec3::Z }.is_misfit(&upper));
-        }
-        assert!(Oriented { place: Vec3::new(0.1, 0.0, 0.001), facing: Vec3::Z }.is_misfit(&upper));
+        let turned =
+            |height: f32| better(&Oriented { place: Vec3::new(0.1, 0.0, height), facing: Vec3::Z }, &upper, None);
+        assert_eq!([0.5, -0.5, 0.001].map(turned), [Ok(None), Ok(None), Ok(Some((-Vec3::Z, false)))]);
     }
 
     #[test]
@@ -293,6 +362,35 @@ mod tests {
         assert_eq!(nearest.mean(), 0.5);
     }
 
+    /// On one bowl, with the normal of something across it.
+    #[test]
+    fn a_line_of_no_sheet_becomes_that_of_the_sheet() {
+        let upper: Vec<Oriented> = bowls().into_iter().step_by(2).collect();
+        let (place, truth) = (Vec3::new(0.2, 0.1, 0.005), Vec3::new(0.04, 0.02, -1.0).normalize());
+        let mut fits = Fits::default();
+        for facing in [Vec3::X, Vec3::new(0.6, 0.0, -0.8)] {
+            let found = better(&Oriented { place, facing }, &upper, Some(&mut fits)).unwrap();
+            assert!(
+                found.is_some_and(|(normal, is_line)| is_line && normal.dot(truth) > 0.9999),
+                "{facing}: {found:?}"
+            );
+            assert_eq!(better(&Oriented { place, facing }, &upper, None), Ok(None));
+        }
+    }
+
+    #[test]
+    fn points_on_the_plane_of_another_patch_are_in_doubt() {
+        let on_floor = |x: f32| (0, Oriented { place: Vec3::new(x, 0.0, 0.0), facing: Vec3::Z });
+        let wall = |x: f32, z: f32| Oriented { place: Vec3::new(x, 0.3, z), facing: Vec3::X };
+        let doubtful = |wall: Oriented| {
+            let mut points = [0.0, 0.2, 0.4, 0.6, 0.8].map(on_floor).into();
+            keep_doubtful(&mut points, Vec3::Z, Vec3::new(0.4, 0.0, 0.0), &[wall]);
+            points.iter().map(|(_, one)| one.place.x).collect::<Vec<f32>>()
+        };
+        assert_eq!(doubtful(wall(0.805, 0.5)), [0.8]);
+        assert_eq!([wall(0.9, 0.5), wall(0.805, 1.1)].map(doubtful), [[], []]);
+    }
+
     #[test]
     fn points_of_an_even_bend_are_in_no_doubt() {
         let upper = || bowls().into_iter().step_by(2).filter(|one| one.place.length() < 0.8);
@@ -304,10 +402,11 @@ mod tests {
             1000,
             Oriented { place: Vec3::new(0.3, 0.0, -0.05), facing: Vec3::new(0.06, 0.0, -1.0).normalize() },
         ));
-        keep_doubtful(&mut points, -Vec3::Z);
+        let mean = points.iter().map(|(_, one)| one.place).sum::<Vec3>() / points.len() as f32;
+        keep_doubtful(&mut points, -Vec3::Z, mean, &[]);
         assert!(points.iter().any(|&(point, _)| point == 1000) && points.len() < count, "{}", points.len());
         let mut few: Vec<(u32, Oriented)> = (0..).zip(upper().take(FEW - 1)).collect();
-        keep_doubtful(&mut few, -Vec3::Z);
+        keep_doubtful(&mut few, -Vec3::Z, Vec3::ZERO, &[]);
         assert_eq!(few.len(), FEW - 1);
     }
 }

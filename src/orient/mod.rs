@@ -7,7 +7,8 @@
 //! what stands before them ([`facing`]), or the scanner, if one saw all: where it stood, if densities tell that ([`station`]),
 //! or the direction from which it did ([`view`]), or several that stood amid them ([`stations`]). Of a few points that are no
 //! surface, what is round them tells the side ([`specks`]). In noise normals then become means of those about them ([`means`]),
-//! and without noise points are turned that stand in the patch of another surface ([`misfits`]).
+//! and without noise points are turned that stand in the patch of another surface, and those next to edges get the normal of the
+//! sheet that they lie on ([`misfits`], [`fits`]).
 
 mod air;
 mod ball;
@@ -16,6 +17,7 @@ mod cubes;
 mod ends;
 mod eye;
 mod facing;
+mod fits;
 mod fours;
 mod groups;
 mod links;
@@ -167,10 +169,11 @@ fn surfaces(
     specks::settle(grid, &patches, &mut signs, &mut decisions, &last.part(0.0..0.1))?;
     let components = Components::of(&decisions)?;
     let of_point = turn(grid, &patches, &members, &signs, normals, options.components, &last.part(0.1..0.4))?;
-    if options.method == Method::Bilinear && options.cell == Cell::Auto {
+    let lines_may_change = options.method == Method::Bilinear && options.cell == Cell::Auto;
+    if lines_may_change {
         means::average(points, &cubes, (&patches, &members), &signs, normals, &last.part(0.4..0.8))?;
     }
-    misfits::turn(points, &cubes, (&patches, &members), &signs, normals, &last.part(0.8..1.0))?;
+    misfits::mend(points, &cubes, (&patches, &members), &signs, lines_may_change, normals, &last.part(0.8..1.0))?;
     last.tell(1.0)?;
     Ok(Surfaces { components, of_point })
 }
