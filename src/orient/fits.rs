@@ -1,7 +1,8 @@
 //! Which sheet a point lies on, of those that the points next to it are of, and the normal of that sheet there.
 //!
 //! On one sheet, if it bends evenly, what lies between two points is across the mean of their normals ([`super::sheets`]). So a
-//! normal fits that comes near to this with each of the points next to it on one sheet: by least squares, and not far from theirs.
+//! normal fits that comes near to this with each of the points next to it on one sheet: by least squares, and not far from
+//! theirs.
 
 use super::patches::aligned;
 use crate::error::Error;
@@ -12,8 +13,8 @@ use std::cmp::Ordering;
 /// Points are of one sheet, whichever way that faces, where the cosine of their normals is more.
 pub(super) const ALIKE: f32 = 0.7;
 
-/// The same, first strictly, because faces that meet at a small angle are two sheets, then loosely, because where a sheet ends or
-/// bends sharply few of its points are alike.
+/// The same, first strictly, because faces that meet at a small angle are two sheets, then loosely, because where a sheet ends
+/// or bends sharply few of its points are alike.
 const SAME: [f32; 2] = [0.98, ALIKE];
 
 /// Up to how far away others tell of the sheet of a point, in edges and squared.
@@ -38,8 +39,8 @@ const FEW: usize = 4;
 const UNEVEN: f32 = 0.001;
 const ROUNDING: f32 = 1e-7;
 
-/// The normal of no sheet is further off the mean of its normals than so many times as these are, squared: where coordinates were
-/// rounded points lie on steps, and whatever is across these is as far off the other way.
+/// The normal of no sheet is further off the mean of its normals than so many times as these are, squared: where coordinates
+/// were rounded points lie on steps, and whatever is across these is as far off the other way.
 const OFF: f32 = 16.0;
 
 /// An oriented point, or the mean of some: where it is, in edges, and its normal.
@@ -82,10 +83,10 @@ pub(super) struct Fits {
 }
 
 impl Fits {
-    /// The normal of the sheet that a point lies on best, of those of the points `near` it, among which it may be itself: if that
-    /// lies off them by less than `limit`, in the mean of the squares of [`Oriented::off`], each as a share of how far away they
-    /// are, and a little more the further the normal is off theirs. None that faces away from its own normal. Of a point that lies
-    /// on several, as on an edge itself, the mean of their normals: so it faces as each of them does.
+    /// The normal of the sheet that a point lies on best, of those of the points `near` it, among which it may be itself: if
+    /// that lies off them by less than `limit`, in the mean of the squares of [`Oriented::off`], each as a share of how far
+    /// away they are, and a little more the further the normal is off theirs. None that faces away from its own normal. Of a
+    /// point that lies on several, as on an edge itself, the mean of their normals: so it faces as each of them does.
     pub fn normal(&mut self, point: &Oriented, near: &[Oriented], limit: f32) -> Result<Option<Vec3>, Error> {
         self.look(point, near)?;
         let (mut least, mut sum) = (f32::INFINITY, Vec3::ZERO);
@@ -140,8 +141,8 @@ impl Fits {
     }
 }
 
-/// The normal that fits some points of one sheet best, and how far these lie off it and that is off theirs: by least squares, with
-/// the mean of their normals as a guess, which is as good as these are alike.
+/// The normal that fits some points of one sheet best, and how far these lie off it and that is off theirs: by least squares,
+/// with the mean of their normals as a guess, which is as good as these are alike.
 fn fit(sheet: &[Near]) -> Option<(f32, Vec3)> {
     let total: f32 = sheet.iter().map(Near::weight).sum();
     let mean = sheet.iter().map(|near| near.weight() * near.facing).sum::<Vec3>().normalize_or_zero();
@@ -206,7 +207,8 @@ mod tests {
         assert_eq!(fits.normal(&away, &edge(), 0.1), Ok(None));
     }
 
-    /// On the rim of a piece of a ball, whose radius is two edges, all others lie to one side: the mean of their normals is off.
+    /// On the rim of a piece of a ball, whose radius is two edges, all others lie to one side: the mean of their normals is
+    /// off.
     #[test]
     fn the_normal_bends_as_its_sheet_does() {
         let on_ball = |x: f32, y: f32| {

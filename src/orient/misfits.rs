@@ -1,9 +1,9 @@
 //! Points with the normal of a surface that they are not on, in clouds without noise, once surfaces have signs.
 //!
-//! Of two surfaces that nearly touch, or meet at an edge, a cube may hold too few points of one for a patch of their own: they join
-//! that of the other one, or are so few that nothing tells which side they face. And next to an edge a point may have the line of the
-//! face beyond, or one between the two. Where surfaces face apart, each point is asked here on which it lies, by the points next to
-//! it ([`super::fits`]).
+//! Of two surfaces that nearly touch, or meet at an edge, a cube may hold too few points of one for a patch of their own: they
+//! join that of the other one, or are so few that nothing tells which side they face. And next to an edge a point may have the
+//! line of the face beyond, or one between the two. Where surfaces face apart, each point is asked here on which it lies, by
+//! the points next to it ([`super::fits`]).
 
 use super::cubes::Cubes;
 use super::fits::{ALIKE, Fits, Oriented, REACH, SOFT};
@@ -25,8 +25,8 @@ const WHAT: &str = "the misfits";
 const APART: f32 = 0.8;
 const HALF_APART: f32 = 0.95;
 
-/// Points are in doubt whose [`Oriented::off`] from the mean of their patch is so much more or less than that of the others, those
-/// that lie no further off the plane of a patch that faces apart, within an edge, and those of patches of fewer.
+/// Points are in doubt whose [`Oriented::off`] from the mean of their patch is so much more or less than that of the others,
+/// those that lie no further off the plane of a patch that faces apart, within an edge, and those of patches of fewer.
 const DOUBT: f32 = 0.006;
 const FEW: usize = 4;
 
@@ -38,8 +38,8 @@ const SAME: f32 = 1e-7;
 /// How many points on either side tell on which sheet one is: the nearest.
 const NEAREST: usize = 4;
 
-/// They tell if on average it lies off the one sheet by less than this share of what it lies off the other one, both squared, and
-/// by no more than a sixth of how far away they are.
+/// They tell if on average it lies off the one sheet by less than this share of what it lies off the other one, both squared,
+/// and by no more than a sixth of how far away they are.
 const CLEAR: f32 = 0.25;
 const ON: f32 = 0.1;
 
@@ -52,10 +52,10 @@ const TANGLE: usize = 50;
 /// Where more points are near, none is asked: each looks at all of them.
 const MOST: usize = 2048;
 
-/// Turns the normals, which have their signs, of points that lie on the sheet of points that face the other way, and not on that of
-/// those which face as they do; only where there is no noise. If lines may change, points that are on another sheet get the normal
-/// of that. Up to [`ROUNDS`] passes over the patches; where those about a cube face apart, each
-/// doubtful point of it looks at the points of the 27 cubes.
+/// Turns the normals, which have their signs, of points that lie on the sheet of points that face the other way, and not on
+/// that of those which face as they do; only where there is no noise. If lines may change, other points whose normals do not
+/// fit those next to them get that of the sheet that they lie on. Up to [`ROUNDS`] passes over the patches; where those about a
+/// cube face apart, each doubtful point of it looks at the points of the 27 cubes.
 pub(super) fn mend(
     points: &Points,
     cubes: &Cubes,
@@ -218,7 +218,8 @@ struct Misfit {
     is_line: bool,
 }
 
-/// Keeps those of the points of a patch, which has its middle there, that lie off it, or on a plane of others; all if they are few.
+/// Keeps those of the points of a patch, which has its middle there, that lie off it, or on a plane of others; all if they are
+/// few.
 fn keep_doubtful(points: &mut Vec<(u32, Oriented)>, facing: Vec3, middle: Vec3, planes: &[Oriented]) {
     if points.len() < FEW {
         return;
@@ -238,8 +239,8 @@ fn keep_doubtful(points: &mut Vec<(u32, Oriented)>, facing: Vec3, middle: Vec3, 
 }
 
 /// The normal of the sheet that a point lies on, of those of the points near by, if it is not on that of those which face as it
-/// does: the opposite of its own, if it is on that of those which face the other way, or by [`Fits`] whatever fits better, and then
-/// `true`.
+/// does: the opposite of its own, if it is on that of those which face the other way, or by [`Fits`] whatever fits better, and
+/// then `true`.
 fn better(one: &Oriented, near: &[Oriented], fits: Option<&mut Fits>) -> Result<Option<(Vec3, bool)>, Error> {
     let (mut same, mut opposite) = (Nearest::NONE, Nearest::NONE);
     for other in near {
