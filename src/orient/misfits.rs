@@ -33,7 +33,7 @@ const FEW: usize = 4;
 /// But their lines are right where those next to one lie off its sheet by less than half this share of how far away they are,
 /// squared, and what differs by less, squared, is no other line.
 const RIGHT: f32 = 1e-9;
-const SAME: f32 = 1e-7;
+const UNCHANGED: f32 = 1e-7;
 
 /// How many points on either side tell on which sheet one is: the nearest.
 const NEAREST: usize = 4;
@@ -260,7 +260,7 @@ fn better(one: &Oriented, near: &[Oriented], fits: Option<&mut Fits>) -> Result<
     }
     let Some(fits) = fits.filter(|_| own >= RIGHT) else { return Ok(None) };
     let normal = fits.normal(one, near, limit)?;
-    Ok(normal.filter(|normal| normal.distance_squared(one.facing) > SAME).map(|normal| (normal, true)))
+    Ok(normal.filter(|normal| normal.distance_squared(one.facing) > UNCHANGED).map(|normal| (normal, true)))
 }
 
 /// The nearest of some points: the square of how far away they are, and of how far they lie off a sheet, as a share of that.
