@@ -15,7 +15,7 @@ pub(super) const ALIKE: f32 = 0.7;
 
 /// The same, first strictly, because faces that meet at a small angle are two sheets, then loosely, because where a sheet ends
 /// or bends sharply few of its points are alike.
-const SAME: [f32; 2] = [0.98, ALIKE];
+const ALIKE_ENOUGH: [f32; 2] = [0.98, ALIKE];
 
 /// Up to how far away others tell of the sheet of a point, in edges and squared.
 pub(super) const REACH: f32 = 2.25;
@@ -39,6 +39,9 @@ const FEW: usize = 4;
 const UNEVEN: f32 = 0.001;
 const ROUNDING: f32 = 1e-7;
 
+/// Added to what may be nothing at all, and is divided by.
+const LITTLE: f32 = ROUNDING * ROUNDING;
+
 /// The normal of no sheet is further off the mean of its normals than so many times as these are, squared: where coordinates
 /// were rounded points lie on steps, and whatever is across these is as far off the other way.
 const OFF: f32 = 16.0;
@@ -57,7 +60,7 @@ impl Oriented {
 }
 
 /// One next to the point that is asked about.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Near {
     /// How far away, in edges and squared.
     square: f32,
@@ -90,31 +93,38 @@ impl Fits {
     pub fn normal(&mut self, point: &Oriented, near: &[Oriented], limit: f32) -> Result<Option<Vec3>, Error> {
         self.look(point, near)?;
         let (mut least, mut sum) = (f32::INFINITY, Vec3::ZERO);
-        for alike in SAME {
-            let mut left = (1u64 << self.near.len()) - 1;
+        for alike in ALIKE_ENOUGH {
+            let mut left = (1 << self.near.len()) - 1;
             for _ in 0..SHEETS {
-                // Of which sheet the next one is that is of none yet.
-                let Some(first) = self.near.get(left.trailing_zeros() as usize) else { break };
-                let (mut sheet, mut count) = ([*first; OF_ONE], 0);
-                for (i, near) in self.near.iter().enumerate() {
-                    if left >> i & 1 == 1 && near.facing.dot(first.facing) >= alike {
-                        left &= !(1 << i);
-                        if count < OF_ONE {
-                            sheet[count] = *near;
-                            count += 1;
-                        }
-                    }
+                let (sheet, count) = self.next_sheet(&mut left, alike);
+                if count < FEW {
+                    continue;
                 }
-                if count >= FEW {
-                    let Some((off, normal)) = fit(&sheet[..count]) else { continue };
-                    if normal.dot(point.facing) > -ALIKE {
-                        least = least.min(off);
-                        sum += (ROUNDING / (off + ROUNDING * ROUNDING)).powi(2) * normal;
-                    }
+                let Some((off, normal)) = fit(&sheet[..count]) else { continue };
+                if normal.dot(point.facing) > -ALIKE {
+                    least = least.min(off);
+                    sum += (ROUNDING / (off + LITTLE)).powi(2) * normal;
                 }
             }
         }
         Ok(sum.try_normalize().filter(|_| least < limit))
+    }
+
+    /// The nearest of the points that are left, one bit for each, and the next whose normals are like its own; in so many of the
+    /// places. Of all that are alike none is left.
+    fn next_sheet(&self, left: &mut u64, alike: f32) -> ([Near; OF_ONE], usize) {
+        let Some(&first) = self.near.get(left.trailing_zeros() as usize) else { return (Default::default(), 0) };
+        let (mut sheet, mut count) = ([first; OF_ONE], 0);
+        for (i, near) in self.near.iter().enumerate() {
+            if *left >> i & 1 == 1 && near.facing.dot(first.facing) >= alike {
+                *left &= !(1 << i);
+                if let Some(place) = sheet.get_mut(count) {
+                    *place = *near;
+                    count += 1;
+                }
+            }
+        }
+        (sheet, count)
     }
 
     /// Finds the points next to one, in an order that does not depend on theirs.
@@ -148,7 +158,7 @@ fn fit(sheet: &[Near]) -> Option<(f32, Vec3)> {
     let mean = sheet.iter().map(|near| near.weight() * near.facing).sum::<Vec3>().normalize_or_zero();
     let unlike = sheet.iter().map(|near| near.weight() * near.facing.distance_squared(mean)).sum::<f32>() / total;
     // How far what lies between two points may be off, as a share of how far the normal may be off the mean.
-    let ridge = UNEVEN + ROUNDING / (unlike + ROUNDING * ROUNDING);
+    let ridge = UNEVEN + ROUNDING / (unlike + LITTLE);
     // Two of the points, so to speak, it fits anyway.
     let share = 1.0 / (sheet.len() - 2) as f32;
     let (mut matrix, mut vector) = (Mat3::from_diagonal(Vec3::splat(ridge)), Vec3::ZERO);
