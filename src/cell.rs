@@ -121,12 +121,22 @@ impl Density {
         Ok(Self { middle: bulk.median, count, occupancy })
     }
 
+    /// The edge of a square of surface for each point. Such a square of as many as are in a cube has half of the area of a face.
+    pub fn spacing(&self) -> f64 {
+        self.edge(POINTS_PER_CELL) / (2.0 * self.at_most(POINTS_PER_CELL)).sqrt()
+    }
+
+    /// Of so many points wanted in each cube, those that leave enough cubes.
+    fn at_most(&self, wanted: f64) -> f64 {
+        wanted.min(self.count as f64 / LEAST_CELLS).max(LEAST_POINTS_PER_CELL)
+    }
+
     /// The edge of cubes that hold about `wanted` points each.
     #[optimize(size)]
     pub fn edge(&self, wanted: f64) -> f64 {
         let (mut edge, mut count) = self.occupancy[0];
+        let wanted = self.at_most(wanted);
         // Points that coincide can't be told apart by any edge, so they count as one.
-        let wanted = wanted.min(self.count as f64 / LEAST_CELLS).max(LEAST_POINTS_PER_CELL);
         let target = wanted * self.occupancy[self.occupancy.len() - 1].1;
         if count < target {
             // A probe is too small already. On a surface the points of a cube grow with its edge squared.

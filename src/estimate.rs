@@ -15,6 +15,7 @@ use crate::options::{Cell, Method, Options, Orient};
 use crate::orient::{Components, orient};
 use crate::points::{Bounds, Bulk, Points};
 use crate::progress::Progress;
+use crate::rounding;
 use crate::source::Source;
 
 /// The normals of a cloud, and how they were found.
@@ -197,12 +198,15 @@ fn adaptive(mut points: Points, cloud: &Cloud, options: &Options, mut laps: Laps
     let progress = laps.progress;
     progress.update("cellSize", 0.03)?;
     let frame = Frame::of(&points);
+    // Only signs ask for it.
+    let step = if cfg!(feature = "full") && options.orient.is_of_surfaces() { rounding::step(&points) } else { 0.0 };
     let bounds = frame.turn(points.positions_mut());
     let density = Density::of(&points, &bounds)?;
     let lattice = Lattice::new(&bounds, &|| density.middle, density.edge(cell::POINTS_PER_CELL), adaptive::CUBES);
+    let is_coarse = rounding::is_coarse(step, &density);
     laps.end("cellSize");
     let lap = &mut |phase| laps.end(phase);
-    let answer = adaptive::normals(points, &lattice, &frame, options, progress, lap)?;
+    let answer = adaptive::normals(points, &lattice, &frame, options, is_coarse, progress, lap)?;
     let mut report = describe(cloud, &lattice, &answer.found, laps);
     report.cells = answer.cubes;
     report.nodes = answer.surfaces;

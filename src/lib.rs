@@ -54,6 +54,7 @@ pub mod ply;
 mod points;
 mod power;
 mod progress;
+mod rounding;
 mod source;
 mod surroundings;
 #[cfg(target_arch = "wasm32")]

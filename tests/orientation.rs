@@ -1017,6 +1017,24 @@ fn what_hides_is_no_view() {
     }
 }
 
+/// Steps of rounded coordinates, as of voxels, are planes without noise, but no faces.
+#[test]
+fn lines_of_coarse_coordinates_are_as_without_signs() {
+    for (name, cloud) in [("sphere", sphere(60_000, 71)), ("terrain", terrain(60_000, 72))] {
+        for step in [0.005, 0.01, 0.02] {
+            let points: Vec<f32> = cloud.points.iter().map(|c| (c / step).round() * step).collect();
+            let [without, with] = [Orient::None, Orient::Consistent].map(|how| {
+                let result = orient(&points, how);
+                (root_mean_square(&angles(&result.normals, &cloud.normals)), result)
+            });
+            println!("{name}, {step}: {:.2} and {:.2} degrees", without.0, with.0);
+            assert!(with.0 < 1.02 * without.0, "{name}, {step}: {} and {}", without.0, with.0);
+            let right = share_right(&with.1.normals, &cloud.normals);
+            assert!(right == 1.0 || right == 0.0 && name == "terrain", "{name}, {step}: {right}");
+        }
+    }
+}
+
 /// What stands on it is one surface with it, and neither its volume nor the convention says which side is up.
 #[test]
 fn ground_faces_what_stands_on_it() {

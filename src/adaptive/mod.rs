@@ -62,7 +62,8 @@ const _: () = assert!(CUBES == (2 << DOUBLINGS) as f64);
 /// Sizes of cubes in all.
 const SIZES: usize = DIVISIONS + DOUBLINGS + 1;
 
-/// Finds the normals of all points, which are in `frame`, on cubes of `lattice`; gives the points up when they are sorted.
+/// Finds the normals of all points, which are in `frame`, on cubes of `lattice`; gives the points up when they are sorted. Where
+/// coordinates are coarse ([`crate::rounding`]) no planes are taken for faces that only the points on them tell.
 /// Calls `lap` at the end of each phase. In time linear in the points; what is divided to the end takes some ten times as long
 /// as what is smooth.
 #[optimize(size)]
@@ -72,6 +73,7 @@ pub(crate) fn normals(
     lattice: &Lattice,
     frame: &Frame,
     options: &Options,
+    is_coarse: bool,
     progress: &Progress,
     lap: &mut dyn FnMut(&'static str),
 ) -> Result<Adaptive, Error> {
@@ -105,7 +107,7 @@ pub(crate) fn normals(
     let stage = progress.stage("vote", 0.5..0.6);
     let chosen = choose(&levels, &stage.part(0.0..0.4))?;
     let tally = Tally::new();
-    let facets = options.orient.is_of_surfaces();
+    let facets = options.orient.is_of_surfaces() && !is_coarse;
     // Without signs they are never asked for, and left out of the module then.
     let exact = cfg!(feature = "full") && facets && facets::are_exact(&levels[levels.len() - 1], &chosen);
     let mut run =

@@ -9,6 +9,7 @@ use crate::lists::grow;
 use crate::median::{self, median};
 use crate::points::{Bounds, Points, spread};
 use crate::progress::Stage;
+use crate::rounding;
 use crate::source::Source;
 use glam::Vec3;
 
@@ -53,11 +54,12 @@ pub(super) fn sort(
         let lattice = Lattice::new(bounds, &|| density.middle, edge, CUBES);
         Grid::sort(&Source::new(points, lattice), stage, |points, _| distinct(points))
     };
+    let slack = |grid: &Grid| slack(grid, normals, &|| rounding::is_coarse(rounding::step(points), density));
     let edge = density.edge(POINTS_PER_CELL);
     let (grid, distinct) = sort(edge, &stage.part(0.0..0.5))?;
     let found = noise(&grid, normals, 1.0)?;
     if found <= LARGEST_NOISE {
-        let slack = slack(&grid, normals)?;
+        let slack = slack(&grid)?;
         return Ok(Cubes { grid, distinct, edge, noise: found, slack });
     }
     let mut scale = ENLARGEMENT;
@@ -68,7 +70,7 @@ pub(super) fn sort(
     drop((grid, distinct));
     let edge = f64::from(scale) * edge;
     let (grid, distinct) = sort(edge, &stage.part(0.5..1.0))?;
-    let (noise, slack) = (noise(&grid, normals, 1.0)?, slack(&grid, normals)?);
+    let (noise, slack) = (noise(&grid, normals, 1.0)?, slack(&grid)?);
     Ok(Cubes { grid, distinct, edge, noise, slack })
 }
 
@@ -106,8 +108,8 @@ fn noise(grid: &Grid, normals: &[Vec3], scale: f32) -> Result<f32, Error> {
 }
 
 /// How far points next to each other lie off a common sheet, in edges, if that is next to nothing: the median that half of some
-/// cubes do not exceed.
-fn slack(grid: &Grid, normals: &[Vec3]) -> Result<Option<f32>, Error> {
+/// cubes do not exceed. Steps of coarse coordinates are no sheets.
+fn slack(grid: &Grid, normals: &[Vec3], is_coarse: &dyn Fn() -> bool) -> Result<Option<f32>, Error> {
     let (mut of_cubes, mut of_points) = (Vec::new(), Vec::new());
     for brick in spread(grid.bricks.len(), BRICKS) {
         for (points, _) in grid.cubes_of(brick) {
@@ -124,7 +126,7 @@ fn slack(grid: &Grid, normals: &[Vec3]) -> Result<Option<f32>, Error> {
             }
         }
     }
-    Ok(Some(median(&of_cubes)).filter(|&slack| slack < EXACT))
+    Ok(Some(median(&of_cubes)).filter(|&slack| slack < EXACT && !is_coarse()))
 }
 
 /// How far two points, so far from each other, lie off a sheet that goes through both as their normals say: what lies between
