@@ -79,6 +79,8 @@ pub(crate) fn edge_of_size(size: f64, unit: f64, paper: f64) -> Result<f64, Erro
 pub(crate) struct Density {
     /// The middle of the bulk.
     pub middle: DVec3,
+    /// The step that coordinates were rounded to, if they were ([`Bulk::step`]).
+    pub step: f64,
     /// Points of the cloud.
     count: usize,
     /// Edges, from large to small, and the points in an occupied cube of each; 0 for one point, or hardly any that is finite.
@@ -98,7 +100,7 @@ impl Density {
         let count = bounds.finite;
         if extent <= 0.0 || bulk.sample.is_empty() {
             let edge = paper_edge(bounds.extent(), count);
-            return Ok(Self { middle: bulk.median, count, occupancy: vec![(edge, 0.0)] });
+            return Ok(Self { middle: bulk.median, step: bulk.step, count, occupancy: vec![(edge, 0.0)] });
         }
         let (mut occupancy, mut extent): (Vec<(f64, f64)>, f64) = (Vec::new(), extent);
         let smallest = RESOLUTION * extent;
@@ -118,25 +120,15 @@ impl Density {
             }
             extent = edge_of(LEVELS);
         }
-        Ok(Self { middle: bulk.median, count, occupancy })
-    }
-
-    /// The edge of a square of surface for each point. Such a square of as many as are in a cube has half of the area of a face.
-    pub fn spacing(&self) -> f64 {
-        self.edge(POINTS_PER_CELL) / (2.0 * self.at_most(POINTS_PER_CELL)).sqrt()
-    }
-
-    /// Of so many points wanted in each cube, those that leave enough cubes.
-    fn at_most(&self, wanted: f64) -> f64 {
-        wanted.min(self.count as f64 / LEAST_CELLS).max(LEAST_POINTS_PER_CELL)
+        Ok(Self { middle: bulk.median, step: bulk.step, count, occupancy })
     }
 
     /// The edge of cubes that hold about `wanted` points each.
     #[optimize(size)]
     pub fn edge(&self, wanted: f64) -> f64 {
         let (mut edge, mut count) = self.occupancy[0];
-        let wanted = self.at_most(wanted);
         // Points that coincide can't be told apart by any edge, so they count as one.
+        let wanted = wanted.min(self.count as f64 / LEAST_CELLS).max(LEAST_POINTS_PER_CELL);
         let target = wanted * self.occupancy[self.occupancy.len() - 1].1;
         if count < target {
             // A probe is too small already. On a surface the points of a cube grow with its edge squared.

@@ -15,7 +15,7 @@ use crate::options::{Cell, Method, Options, Orient};
 use crate::orient::{Components, orient};
 use crate::points::{Bounds, Bulk, Points};
 use crate::progress::Progress;
-use crate::rounding;
+use crate::rounding::Rounding;
 use crate::source::Source;
 
 /// The normals of a cloud, and how they were found.
@@ -54,7 +54,8 @@ pub struct Report {
     /// Edge of a cube, in multiples of the paper's L (Eq. 1).
     pub scale: f64,
     /// How far the points lie off the surfaces that were chosen for them, in units of the input: the deviation that half of
-    /// them do not exceed, to 2 %; 0 if there is no surface. Only [`Cell::Auto`] measures it.
+    /// them do not exceed, to 2 %; 0 if there is no surface. No less than rounded coordinates are off by. Only [`Cell::Auto`]
+    /// measures it.
     pub noise: Option<f64>,
     /// The sizes of the neighbourhoods that [`Cell::Auto`] chose, the smallest first.
     pub scales: Vec<Scale>,
@@ -198,15 +199,13 @@ fn adaptive(mut points: Points, cloud: &Cloud, options: &Options, mut laps: Laps
     let progress = laps.progress;
     progress.update("cellSize", 0.03)?;
     let frame = Frame::of(&points);
-    // Only signs ask for it.
-    let step = if cfg!(feature = "full") && options.orient.is_of_surfaces() { rounding::step(&points) } else { 0.0 };
     let bounds = frame.turn(points.positions_mut());
     let density = Density::of(&points, &bounds)?;
     let lattice = Lattice::new(&bounds, &|| density.middle, density.edge(cell::POINTS_PER_CELL), adaptive::CUBES);
-    let is_coarse = rounding::is_coarse(step, &density);
+    let rounding = Rounding::of(frame.step, lattice.edge());
     laps.end("cellSize");
     let lap = &mut |phase| laps.end(phase);
-    let answer = adaptive::normals(points, &lattice, &frame, options, is_coarse, progress, lap)?;
+    let answer = adaptive::normals(points, &lattice, &frame, options, rounding, progress, lap)?;
     let mut report = describe(cloud, &lattice, &answer.found, laps);
     report.cells = answer.cubes;
     report.nodes = answer.surfaces;

@@ -13,11 +13,13 @@ pub(crate) struct Frame {
     origin: DVec3,
     /// The unit vectors along the axes.
     pub axes: [Vec3; 3],
+    /// The step that coordinates of the positions were rounded to, if they were.
+    pub step: f64,
 }
 
 impl Frame {
     /// The frame of the positions themselves.
-    pub const GIVEN: Self = Self { origin: DVec3::ZERO, axes: Vec3::AXES };
+    pub const GIVEN: Self = Self { origin: DVec3::ZERO, axes: Vec3::AXES, step: 0.0 };
 
     /// A frame that moves and turns with the points.
     ///
@@ -28,7 +30,7 @@ impl Frame {
     #[optimize(size)]
     #[inline(never)]
     pub fn of(points: &Points) -> Self {
-        let Bulk { median, mut sample, .. } = Bulk::of_points(points);
+        let Bulk { median, mut sample, step, .. } = Bulk::of_points(points);
         let count = sample.len() as f64;
         // Relative to the median first, so that where the cloud is changes no bit.
         let mut mean = DVec3::ZERO;
@@ -63,7 +65,7 @@ impl Frame {
         if !is_orthonormal {
             return Self::GIVEN;
         }
-        Self { origin: median, axes: axes.map(|axis| (middle - axis).as_vec3()) }
+        Self { origin: median, axes: axes.map(|axis| (middle - axis).as_vec3()), step }
     }
 
     /// Moves positions into this frame, and tells their box there.

@@ -199,6 +199,9 @@ pub(crate) struct Bulk {
     pub extent: f64,
     /// The same of the middle half.
     pub core: f64,
+    /// No two of these points differ by less along an axis, but those that do not at all: of coordinates that were rounded their
+    /// step.
+    pub step: f64,
     /// The finite points looked at.
     pub sample: Vec<DVec3>,
     /// Their places, each once, sorted.
@@ -220,21 +223,32 @@ impl Bulk {
         let mut places: Vec<[i64; 3]> = sample.iter().map(|p| p.to_array().map(ordinal)).collect();
         sort_unique(&mut places);
         let distinct = places.iter().map(|place| DVec3::from_array(place.map(from_ordinal))).collect();
-        let mut bulk = Self { median: DVec3::ZERO, extent: 0.0, core: 0.0, sample, distinct };
+        let mut bulk = Self { median: DVec3::ZERO, extent: 0.0, core: 0.0, step: f64::INFINITY, sample, distinct };
         if places.is_empty() {
             return bulk;
         }
         for axis in 0..3 {
             let mut values: Vec<i64> = places.iter().map(|place| place[axis]).collect();
             sort(&mut values);
-            let quantile = |q: f64| from_ordinal(values[((values.len() - 1) as f64 * q + 0.5) as usize]);
-            let [lowest, low, median, high, highest] = [0.05, 0.25, 0.5, 0.75, 0.95].map(quantile);
-            bulk.median[axis] = median;
-            bulk.extent = bulk.extent.max(highest - lowest);
-            bulk.core = bulk.core.max(high - low);
+            let middle = |low: f64, high: f64| quantile(&values, high) - quantile(&values, low);
+            bulk.median[axis] = quantile(&values, 0.5);
+            bulk.extent = bulk.extent.max(middle(0.05, 0.95));
+            bulk.core = bulk.core.max(middle(0.25, 0.75));
+            for two in values.windows(2) {
+                let difference = from_ordinal(two[1]) - from_ordinal(two[0]);
+                if difference > 0.0 && difference < bulk.step {
+                    bulk.step = difference;
+                }
+            }
         }
         bulk
     }
+}
+
+/// What a share of sorted numbers, as [`ordinal`]s, does not exceed.
+#[inline(never)]
+fn quantile(sorted: &[i64], share: f64) -> f64 {
+    from_ordinal(sorted[((sorted.len() - 1) as f64 * share + 0.5) as usize])
 }
 
 /// The origin to subtract from double coordinates before they are rounded to single precision: zero where single

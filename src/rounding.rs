@@ -1,40 +1,40 @@
-//! Whether coordinates were rounded so coarsely that steps decide how points lie.
+//! What coordinates lost when they were rounded, against how densely points lie.
 //!
-//! Points of voxels, of centimetres where they are as dense as that, and of strongly compressed clouds lie on planes without noise
-//! that are no surfaces, and in rows. Where they lie tells nothing exactly.
+//! Points of voxels, of centimetres where they are as dense as that, and of strongly compressed clouds lie on steps: planes without
+//! noise that are no surfaces. How exactly points lie on these tells nothing.
 
-use crate::cell::Density;
-use crate::order::{from_ordinal, ordinal, sort};
-use crate::points::{Points, SAMPLE, spread};
-use glam::Vec3;
+/// Steps are coarse that are as wide as this share of the edge of a cube with 32 points: of a surface with such a spacing between
+/// them that eight are an edge, a third of that. With half of it planes of steps pass for faces.
+const COARSE: f64 = 1.0 / 24.0;
 
-/// Steps are coarse that are as wide as this share of the spacing of the points: with half of it planes of steps pass for faces.
-const COARSE: f64 = 1.0 / 3.0;
+/// And fine if they are narrower than this, a sixth of the spacing: surfaces are not known any better than such coordinates.
+const FINE: f64 = 1.0 / 48.0;
 
-/// The step that coordinates were rounded to, in units of the positions: no two of some points differ by less along any axis, but
-/// for those that do not differ at all. Takes a quarter of a millisecond.
-#[inline(never)]
-pub(crate) fn step(points: &Points) -> f64 {
-    let some = || spread(points.len(), SAMPLE).map(|point| points.positions[point]).filter(|place| place.is_finite());
-    (0..3).map(|axis| least_difference(some().map(|place: Vec3| place[axis]))).fold(f64::INFINITY, f64::min)
+/// How coordinates were rounded.
+#[derive(Clone, Copy)]
+pub(crate) struct Rounding {
+    /// The variance that a coordinate has from that, in edges and squared; 0 if it is next to nothing.
+    pub variance: f32,
+    /// Whether steps are hardly narrower than the spacing of the points.
+    pub is_coarse: bool,
 }
 
-/// Whether steps are coarse for points so dense.
-pub(crate) fn is_coarse(step: f64, density: &Density) -> bool {
-    step >= COARSE * density.spacing()
-}
-
-fn least_difference(numbers: impl Iterator<Item = f32>) -> f64 {
-    let mut sorted: Vec<i64> = numbers.map(|number| ordinal(number.into())).collect();
-    sort(&mut sorted);
-    let differences = sorted.windows(2).map(|two| from_ordinal(two[1]) - from_ordinal(two[0]));
-    differences.filter(|&difference| difference > 0.0).fold(f64::INFINITY, f64::min)
+impl Rounding {
+    /// To steps, of points that are so dense that cubes of [`crate::cell::POINTS_PER_CELL`] have an edge.
+    #[inline(always)]
+    pub fn of(step: f64, edge: f64) -> Self {
+        let share = step / edge;
+        let variance = if share > FINE { share * share / 12.0 } else { 0.0 };
+        Self { variance: variance as f32, is_coarse: share >= COARSE }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::points::Bounds;
+    use crate::cell::{Density, POINTS_PER_CELL};
+    use crate::points::{Bounds, Points};
+    use glam::Vec3;
 
     /// Of points with a spacing of about 1, each moved.
     fn is_coarse_of(points: u32, moved: impl Fn(u32, Vec3) -> Vec3) -> bool {
@@ -50,26 +50,17 @@ mod tests {
             })
             .collect();
         let points = Points::from_f32(&coordinates).unwrap();
-        is_coarse(step(&points), &Density::of(&points, &Bounds::of(&points)).unwrap())
+        let density = Density::of(&points, &Bounds::of(&points)).unwrap();
+        Rounding::of(density.step, density.edge(POINTS_PER_CELL)).is_coarse
     }
 
     #[test]
     fn coarse_are_steps_that_are_hardly_narrower_than_the_spacing() {
-        let rounded = |step: f32| move |_, place: Vec3| (place / step).round() * step;
+        let is_coarse_to = |points: u32, step: f32| is_coarse_of(points, |_, place| (place / step).round() * step);
         for points in [1000, 100_000] {
-            for (size, coarse) in [
-                (0.0, false),
-                (0.02, false),
-                (0.1, false),
-                (0.25, false),
-                (0.5, true),
-                (1.0, true),
-                (2.0, true),
-                (5.0, true),
-            ] {
-                let rounded = |_, place: Vec3| if size > 0.0 { (place / size).round() * size } else { place };
-                assert_eq!(is_coarse_of(points, rounded), coarse, "{points} points, steps of {size}");
-            }
+            assert!([0.5, 1.0, 2.0, 5.0].into_iter().all(|step| is_coarse_to(points, step)), "{points}");
+            assert!(![0.02, 0.1, 0.25].into_iter().any(|step| is_coarse_to(points, step)), "{points}");
+            assert!(!is_coarse_of(points, |_, place| place), "{points}");
         }
     }
 
@@ -78,5 +69,18 @@ mod tests {
         assert!(!is_coarse_of(30_000, |i, place| Vec3::new((i % 100) as f32, (i / 100) as f32, place.z)));
         assert!(!is_coarse_of(30_000, |_, place| place.round() + 0.01 * place));
         assert!(is_coarse_of(30_000, |i, place| if i % 100 == 0 { Vec3::NAN } else { place.round() }));
+    }
+
+    #[test]
+    fn the_variance_of_a_step_is_a_twelfth_of_its_square() {
+        assert!((Rounding::of(0.3, 2.0).variance - 0.15 * 0.15 / 12.0).abs() < 1e-8);
+        let mut state = 0.0f64;
+        let rounded = (0..10_000).map(|_| {
+            state = (state + 0.618_033_988_75).fract();
+            (state / 0.15).round() * 0.15 - state
+        });
+        let variance = rounded.map(|off| off * off).sum::<f64>() / 10_000.0;
+        assert!((variance / f64::from(Rounding::of(0.15, 1.0).variance) - 1.0).abs() < 0.05, "{variance}");
+        assert_eq!(Rounding::of(0.02, 1.0).variance, 0.0);
     }
 }

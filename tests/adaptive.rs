@@ -229,6 +229,31 @@ fn noise_is_not_divided() {
 }
 
 /// Waves shorter than the cubes that 'auto' begins with, ten point spacings.
+/// Floors that are nearly level, and whatever else, of coordinates in steps of a third of the spacing and more.
+#[test]
+fn steps_of_rounded_coordinates_are_noise() {
+    let slope = |degrees: f64| {
+        plane(
+            100_000,
+            36,
+            [0.8 * degrees.to_radians().sin(), 0.6 * degrees.to_radians().sin(), degrees.to_radians().cos()],
+        )
+    };
+    for (name, cloud, steps) in [
+        ("3 degrees", slope(3.0), [(0.0022, 0.05), (0.0044, 0.3), (0.0063, 1.0)]),
+        ("10 degrees", slope(10.0), [(0.0022, 0.05), (0.0044, 0.05), (0.0088, 0.3)]),
+        ("terrain", terrain(100_000, 37), [(0.0022, 0.9), (0.0044, 1.3), (0.0088, 2.5)]),
+        ("sphere", sphere(100_000, 38), [(0.004, 0.2), (0.008, 0.4), (0.016, 1.3)]),
+    ] {
+        for (step, bound) in steps {
+            let points = cloud.points.iter().map(|c| (c / step).round() * step).collect();
+            let error = root_mean_square(&errors(&Cloud { points, normals: cloud.normals.clone() }).0);
+            println!("{name}, {step}: {error} degrees");
+            assert!(error < bound, "{name}, {step}: {error} degrees");
+        }
+    }
+}
+
 #[test]
 fn corrugations_are_no_noise() {
     let mut random = Random(22);

@@ -24,6 +24,8 @@ pub(super) struct Level {
     /// For each cube its last sample, plus one.
     sample_end: Vec<u32>,
     pub surfaces: Vec<Surface>,
+    /// The variance of coordinates that were rounded, in edges and squared.
+    rounding: f32,
     /// What each cube is here for; if empty, all are wanted.
     roles: Vec<Role>,
 }
@@ -48,7 +50,7 @@ impl Level {
     /// Sorts the points, and counts the samples of each cube: the points of an octant are one.
     #[optimize(size)]
     #[inline(never)]
-    pub fn new(source: &Source, stage: &Stage) -> Result<Self, Error> {
+    pub fn new(source: &Source, rounding: f32, stage: &Stage) -> Result<Self, Error> {
         let count = |placed: &[Placed], centre: Vec3| octants(placed, centre).count() as u32;
         let (grid, mut sample_end) = Grid::sort(source, stage, count)?;
         let mut total = 0;
@@ -57,7 +59,7 @@ impl Level {
             *end = total;
         }
         let (samples, surfaces, roles) = (Vec::new(), Vec::new(), Vec::new());
-        Ok(Self { lattice: source.lattice, grid, samples, sample_end, surfaces, roles })
+        Ok(Self { lattice: source.lattice, grid, samples, sample_end, surfaces, rounding, roles })
     }
 
     /// Makes the samples. `wholes` says what each point stands for, if not for itself: in edges half as long.
@@ -103,7 +105,7 @@ impl Level {
         let other = OtherGrid { bricks: &self.grid.bricks.places, ends: &self.grid.first_cube[1..], edge: 0.5 };
         let lattice = self.lattice.coarser();
         let source = Source { lattice, positions: &positions, numbers: None, other: Some(other) };
-        let mut level = Self::new(&source, &stage.part(0.3..0.9))?;
+        let mut level = Self::new(&source, 0.25 * self.rounding, &stage.part(0.3..0.9))?;
         drop(positions);
         level.sample(Some(&wholes), &stage.part(0.9..1.0))?;
         Ok(level)
@@ -166,7 +168,7 @@ impl Level {
         let other = OtherGrid { bricks: &grid.bricks.places, ends: &ends[1..], edge: 2.0 };
         let lattice = self.lattice.finer().part(2 * first, 2 * last + 1);
         let source = Source { lattice, positions: &positions, numbers: Some(&numbers), other: Some(other) };
-        let mut level = Self::new(&source, &stage.part(0.2..0.45))?;
+        let mut level = Self::new(&source, 4.0 * self.rounding, &stage.part(0.2..0.45))?;
         drop((positions, numbers, ends));
         level.sample(None, &stage.part(0.45..0.5))?;
         let roles = Filling::new(level.grid.cubes(), WHAT)?;
@@ -260,7 +262,7 @@ impl Level {
                         window.add(samples(cube as usize), step, shares.element_product());
                     }
                 }
-                let mut surface = window.fit();
+                let mut surface = window.fit().rounded(self.rounding);
                 if surface.may_hide_parts() {
                     // Whichever sample: the cubes beside have theirs.
                     surface.is_folded = window.stand_across(&surface, samples(cube)[0].place);

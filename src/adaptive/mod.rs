@@ -26,6 +26,7 @@ use crate::normals::{Found, Normals};
 use crate::options::Options;
 use crate::points::Points;
 use crate::progress::{Progress, Stage};
+use crate::rounding::Rounding;
 use crate::source::Source;
 use choose::{Chosen, choose};
 use level::{Level, Role};
@@ -73,11 +74,11 @@ pub(crate) fn normals(
     lattice: &Lattice,
     frame: &Frame,
     options: &Options,
-    is_coarse: bool,
+    rounding: Rounding,
     progress: &Progress,
     lap: &mut dyn FnMut(&'static str),
 ) -> Result<Adaptive, Error> {
-    let mut base = Level::new(&Source::new(&points, *lattice), &progress.stage("sort", 0.06..0.28))?;
+    let mut base = Level::new(&Source::new(&points, *lattice), rounding.variance, &progress.stage("sort", 0.06..0.28))?;
     let count = points.len();
     drop(points);
     // At once: they fit into the memory that the positions had, unless something smaller takes a part of it first.
@@ -107,9 +108,9 @@ pub(crate) fn normals(
     let stage = progress.stage("vote", 0.5..0.6);
     let chosen = choose(&levels, &stage.part(0.0..0.4))?;
     let tally = Tally::new();
-    let facets = options.orient.is_of_surfaces() && !is_coarse;
     // Without signs they are never asked for, and left out of the module then.
-    let exact = cfg!(feature = "full") && facets && facets::are_exact(&levels[levels.len() - 1], &chosen);
+    let facets = cfg!(feature = "full") && options.orient.is_of_surfaces() && !rounding.is_coarse;
+    let exact = facets && facets::are_exact(&levels[levels.len() - 1], &chosen);
     let mut run =
         Run { batch: BATCH.max(count / 8), facets, exact, normals: &normals, tally: &tally, cubes: 0, surfaces: 0 };
     let parts = run.settle(&levels, &chosen, 0, &stage.part(0.4..1.0))?;

@@ -80,6 +80,19 @@ impl Surface {
         is_folded: false,
     };
 
+    /// The same where coordinates that were rounded have this variance: it is noise, however exactly points lie on steps, and none
+    /// of that is detail.
+    pub fn rounded(mut self, rounding: f32) -> Self {
+        if rounding > 0.0 {
+            if self.noise < rounding {
+                self.noise = rounding;
+            }
+            self.error += 2.0 * rounding / (self.points * self.width);
+            self.lacks_detail &= self.noise > 2.0 * rounding;
+        }
+        self
+    }
+
     /// Variance of the angle of its normal at a place.
     pub fn variance_at(&self, place: Vec3) -> f32 {
         self.error + self.error_growth * place.distance_squared(self.quadric.centre)

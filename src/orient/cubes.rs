@@ -1,7 +1,7 @@
 //! The cubes whose points are parted into patches: so large that a noisy surface is no thicker than one.
 
 use super::patches::aligned;
-use crate::cell::Density;
+use crate::cell::{self, Density};
 use crate::error::Error;
 use crate::grid::{Grid, Placed};
 use crate::lattice::{BRICK, CUBES, Lattice};
@@ -9,7 +9,7 @@ use crate::lists::grow;
 use crate::median::{self, median};
 use crate::points::{Bounds, Points, spread};
 use crate::progress::Stage;
-use crate::rounding;
+use crate::rounding::Rounding;
 use crate::source::Source;
 use glam::Vec3;
 
@@ -54,7 +54,9 @@ pub(super) fn sort(
         let lattice = Lattice::new(bounds, &|| density.middle, edge, CUBES);
         Grid::sort(&Source::new(points, lattice), stage, |points, _| distinct(points))
     };
-    let slack = |grid: &Grid| slack(grid, normals, &|| rounding::is_coarse(rounding::step(points), density));
+    let slack = |grid: &Grid| {
+        slack(grid, normals, &|| Rounding::of(density.step, density.edge(cell::POINTS_PER_CELL)).is_coarse)
+    };
     let edge = density.edge(POINTS_PER_CELL);
     let (grid, distinct) = sort(edge, &stage.part(0.0..0.5))?;
     let found = noise(&grid, normals, 1.0)?;
