@@ -1,10 +1,12 @@
-// A sampler and a variant -> a cloud with its true normals: seeded noise and density patterns, as in PCPNet's data.
+// A sampler and a variant -> a cloud with its true normals: seeded noise and density patterns, as in PCPNet's data, and
+// coordinates that were rounded.
 
 import { mulberry } from '../clouds.mjs';
 
 /**
  * `noise`: the standard deviation as a share of the diagonal of the clean cloud's box. `keep`: the share of candidates
- * that stay, by their place along the longest side of the box, 0 to 1.
+ * that stay, by their place along the longest side of the box, 0 to 1. `step`: what coordinates are rounded to multiples
+ * of, as a share of that diagonal.
  */
 export const VARIANTS = {
   clean: {},
@@ -13,13 +15,16 @@ export const VARIANTS = {
   'noise1.2': { noise: 0.012 },
   stripes: { keep: (place) => (Math.floor(10 * place) % 2 === 0 ? 1 : 0.1) },
   gradient: { keep: (place) => 1 - 0.95 * place },
+  steps: { step: 1 / 400 },
 };
+/** Those of PCPNet. */
+export const PCPNET = Object.keys(VARIANTS).filter((name) => name !== 'steps');
 
 /** Candidates that show where the box of a surface is. */
 const PILOT = 20_000;
 
 /** `count` points and their true normals, both Float32Array; the clean and the noisy ones are the same points. */
-export function cloudOf(sampler, count, { noise, keep }, seed) {
+export function cloudOf(sampler, count, { noise, keep, step }, seed) {
   const [positions, normals] = [new Float32Array(3 * count), new Float32Array(3 * count)];
   const stays = keep ? pattern(sampler, keep, seed) : () => true;
   const random = mulberry(Math.imul(seed, 0x9e3779b1));
@@ -32,6 +37,10 @@ export function cloudOf(sampler, count, { noise, keep }, seed) {
     at += 3;
   }
   if (noise) blur(positions, noise * diagonal({ positions, normals }), mulberry(Math.imul(seed, 0x85ebca6b)));
+  if (step) {
+    const width = step * diagonal({ positions, normals });
+    positions.forEach((place, i) => (positions[i] = Math.round(place / width) * width));
+  }
   return { positions, normals };
 }
 

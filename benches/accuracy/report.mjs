@@ -1,7 +1,7 @@
 // Rows to text: docs/accuracy.md.
 
 import { count, paragraphs, percent, sources, table } from '../format.mjs';
-import { VARIANTS } from './clouds.mjs';
+import { PCPNET, VARIANTS } from './clouds.mjs';
 import { LIMITS } from './judge.mjs';
 import { ALL, ENOUGH, JET, KNN, LEAST, METHODS, NEIGHBOURS, RUNS, geometricMean } from './measure.mjs';
 
@@ -15,6 +15,7 @@ const LABELS = {
   'noise1.2': 'noise 1.2 %',
   stripes: 'stripes',
   gradient: 'gradient',
+  steps: 'steps',
 };
 /** Root mean square of a method: over all points, of a jet over the sampled ones. */
 const rms = ({ rms, sampled }) => rms ?? sampled;
@@ -34,7 +35,7 @@ export function report(rows, { machine, threads, minutes, sampled, hasFolder, sk
     `${model}, ${cores} cores, Node ${node}, ${date}; took ${minutes.toFixed(1)} minutes. Errors are unsigned angles in degrees, mostly their root mean square; a point without a normal counts as 90, outliers do not count. Times are of WebAssembly in Node with ${threads} ${threads === 1 ? 'thread' : 'threads'}, what the caller waits for, the fastest of ${RUNS} runs, or of fewer where these take more than ${ENOUGH} ms.`,
     "**auto** is what the package does by itself; **L** is that of the paper’s Eq. 1, so that “1 L” is `cell: { scale: 1 }`; **knn** is `method: 'knn'`, the plane of the k nearest points. " +
       `**jet** is a quadratic height function fitted to the k nearest points, by a reference in JavaScript (benches/accuracy/jet.mjs), at ${count(sampled)} points of each row among all of its points.`,
-    `**Best k** is the knn of smallest error among k = ${NEIGHBOURS.join(', ')}, chosen in hindsight; the ratio is the error of auto over that of the best k, where errors below ${LEAST} degrees count as ${LEAST}. The rows are described in benches/accuracy/shapes.mjs and clouds.mjs; the variants follow PCPNet’s data: noise is normally distributed, its standard deviation a share of the diagonal of the box; in stripes every second of ten bands along the longest side has a tenth of the density; a gradient falls along it to a twentieth.`,
+    `**Best k** is the knn of smallest error among k = ${NEIGHBOURS.join(', ')}, chosen in hindsight; the ratio is the error of auto over that of the best k, where errors below ${LEAST} degrees count as ${LEAST}. The rows are described in benches/accuracy/shapes.mjs and clouds.mjs; the variants follow PCPNet’s data: noise is normally distributed, its standard deviation a share of the diagonal of the box; in stripes every second of ten bands along the longest side has a tenth of the density; a gradient falls along it to a twentieth. Not of these are steps: coordinates rounded to 1/400 of that diagonal, as of voxels; once turned these are no multiples any more.`,
     '## In short',
     overview(rows, measured),
     '## As PCPNet’s table: generated shapes',
@@ -96,10 +97,10 @@ function overview(rows, measured) {
   );
 }
 
-/** Mean over the clouds that are there in all six variants, as PCPNet's table has it. */
+/** Mean over the clouds that are there in all six variants of PCPNet, as its table has it. */
 function columns(rows) {
-  const names = [...new Set(rows.map(({ name }) => name))].filter(
-    (name) => rows.filter((row) => row.name === name).length === variants.length,
+  const names = [...new Set(rows.map(({ name }) => name))].filter((name) =>
+    PCPNET.every((variant) => rows.some((row) => row.name === name && row.variant === variant)),
   );
   if (names.length === 0) return 'No cloud is there in all six variants.';
   const of = (variant) => rows.filter((row) => row.variant === variant && names.includes(row.name));
@@ -110,23 +111,23 @@ function columns(rows) {
     degrees(mean(values.map(({ value }) => value))),
   ];
   const bestOf = (methods) =>
-    variants.map((variant) => least(methods.map((name) => ({ name, value: value(variant, name) }))));
+    PCPNET.map((variant) => least(methods.map((name) => ({ name, value: value(variant, name) }))));
   const withName = ({ name, value }) => `${degrees(value)} (${name.replace(/^\S+ /, '')})`;
   return paragraphs(
     table(
-      ['', ...variants.map((variant) => LABELS[variant]), 'mean'],
+      ['', ...PCPNET.map((variant) => LABELS[variant]), 'mean'],
       [
         ...ALL.map((method) =>
           line(
             method,
-            variants.map((variant) => ({ value: value(variant, method) })),
+            PCPNET.map((variant) => ({ value: value(variant, method) })),
           ),
         ),
         line('best k of each column, knn', bestOf(KNN), withName),
         line('best k of each column, jet', bestOf(JET), withName),
         line(
           'best k of each row, knn',
-          variants.map((variant) => ({ value: mean(of(variant).map(({ methods, best }) => methods[best].rms)) })),
+          PCPNET.map((variant) => ({ value: mean(of(variant).map(({ methods, best }) => methods[best].rms)) })),
         ),
       ],
     ),

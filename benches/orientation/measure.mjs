@@ -1,6 +1,6 @@
 // The measurements: rows of clouds with known signs, as plain numbers.
 
-import { VARIANTS, cloudOf, diagonal } from '../accuracy/clouds.mjs';
+import { PCPNET, VARIANTS, cloudOf, diagonal } from '../accuracy/clouds.mjs';
 import { angles, summary } from '../accuracy/judge.mjs';
 import { likeliest } from './attainable.mjs';
 import { rightSigns, verdicts } from './judge.mjs';
@@ -35,7 +35,7 @@ export const FULL = {
   points: 100_000,
   large: 1_000_000,
   surface: 300_000,
-  meshVariants: Object.keys(VARIANTS),
+  meshVariants: PCPNET,
   viewVariants: ['clean', 'noise0.12'],
 };
 /** For tests: seconds. */

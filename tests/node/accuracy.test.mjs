@@ -4,7 +4,7 @@ import { mkdirSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, before, describe, test } from 'node:test';
 import { gzipSync } from 'node:zlib';
-import { VARIANTS, cloudOf } from '../../benches/accuracy/clouds.mjs';
+import { VARIANTS, cloudOf, diagonal } from '../../benches/accuracy/clouds.mjs';
 import { jetNormal, principalAxes } from '../../benches/accuracy/jet.mjs';
 import { angles, summary, unresolved } from '../../benches/accuracy/judge.mjs';
 import {
@@ -143,6 +143,18 @@ describe('the shapes', () => {
   });
 });
 
+test('steps of coordinates', () => {
+  const [clean, steps] = ['clean', 'steps'].map((variant) => cloudOf(SHAPES.tube(), 20_000, VARIANTS[variant], 3));
+  const width = diagonal(clean) / 400;
+  const moves = steps.positions.map((value, i) => value - clean.positions[i]);
+  assert.ok(
+    moves.every((move) => Math.abs(move) <= 0.5001 * width) && moves.some((move) => Math.abs(move) > 0.49 * width),
+  );
+  const numbers = [...new Set(steps.positions)].sort((a, b) => a - b);
+  assert.ok(numbers.slice(1).every((value, i) => value - numbers[i] > 0.999 * width));
+  assert.ok(sameBits(clean.normals, steps.normals));
+});
+
 describe('the rows', () => {
   test('all shapes in all variants, and every mesh in every variant', () => {
     const rows = plannedRows(FULL, [{ name: 'bunny', about: 'a bunny', sampler: SHAPES.sphere() }]);
@@ -154,8 +166,8 @@ describe('the rows', () => {
 
   test('are chosen by shape, variant or both', () => {
     const rows = plannedRows(FULL, []);
-    assert.equal(chosenRows(rows, ['torus']).length, 6);
-    assert.equal(chosenRows(rows, ['torus', 'torus-clean']).length, 6);
+    assert.equal(chosenRows(rows, ['torus']).length, 7);
+    assert.equal(chosenRows(rows, ['torus', 'torus-clean']).length, 7);
     assert.equal(chosenRows(rows, ['stripes', 'cube-clean']).length, Object.keys(SHAPES).length + 1);
     assert.throws(() => chosenRows(rows, ['torus', 'teapot']), /no row is called teapot; wanted some of sphere, clean/);
   });
