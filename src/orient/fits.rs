@@ -5,8 +5,10 @@
 //! theirs.
 
 use super::patches::aligned;
+use crate::bricks::set_bits;
 use crate::error::Error;
 use crate::lists::grow;
+use crate::order::sort_few;
 use glam::{Mat3, Vec3};
 use std::cmp::Ordering;
 
@@ -32,7 +34,7 @@ const SHEETS: usize = 4;
 const OF_ONE: usize = 8;
 
 /// Fewer tell nothing of a sheet.
-const FEW: usize = 4;
+const FEW: u32 = 4;
 
 /// By how much twice what lies between two points is off a sheet: this share of how unlike its normals are, because none bends
 /// quite evenly, and as much as normals are off; both squared.
@@ -66,22 +68,16 @@ struct Near {
     square: f32,
     offset: Vec3,
     facing: Vec3,
-}
-
-impl Near {
     /// What lies between the two, about as long as 1, however far away it is.
-    fn direction(&self) -> Vec3 {
-        self.offset / (self.square + SOFT).sqrt()
-    }
-
-    fn weight(&self) -> f32 {
-        1.0 / (self.square + SOFT)
-    }
+    direction: Vec3,
+    weight: f32,
 }
 
 /// The points next to one.
 #[derive(Default)]
 pub(super) struct Fits {
+    /// How far away they are, squared, as bits, which have the same order, and their numbers.
+    order: Vec<u64>,
     near: Vec<Near>,
 }
 
@@ -93,14 +89,20 @@ impl Fits {
     pub fn normal(&mut self, point: &Oriented, near: &[Oriented], limit: f32) -> Result<Option<Vec3>, Error> {
         self.look(point, near)?;
         let (mut least, mut sum) = (f32::INFINITY, Vec3::ZERO);
+        let mut found = [(0, None); SHEETS];
         for alike in ALIKE_ENOUGH {
             let mut left = (1 << self.near.len()) - 1;
-            for _ in 0..SHEETS {
-                let (sheet, count) = self.next_sheet(&mut left, alike);
-                if count < FEW {
+            for number in 0..SHEETS {
+                let sheet = self.next_sheet(&mut left, alike);
+                if sheet.count_ones() < FEW {
                     continue;
                 }
-                let Some((off, normal)) = fit(&sheet[..count]) else { continue };
+                // Most are the same, however alike.
+                if !found.iter().any(|&(same, _)| same == sheet) {
+                    found[number] = (sheet, self.fit(sheet));
+                }
+                let fitted = found.iter().find_map(|&(same, fitted)| fitted.filter(|_| same == sheet));
+                let Some((off, normal)) = fitted else { continue };
                 if normal.dot(point.facing) > -ALIKE {
                     least = least.min(off);
                     sum += (ROUNDING / (off + LITTLE)).powi(2) * normal;
@@ -110,69 +112,89 @@ impl Fits {
         Ok(sum.try_normalize().filter(|_| least < limit))
     }
 
-    /// The nearest of the points that are left, one bit for each, and the next whose normals are like its own; in so many of the
-    /// places. Of all that are alike none is left.
-    fn next_sheet(&self, left: &mut u64, alike: f32) -> ([Near; OF_ONE], usize) {
-        let Some(&first) = self.near.get(left.trailing_zeros() as usize) else { return (Default::default(), 0) };
-        let (mut sheet, mut count) = ([first; OF_ONE], 0);
-        for (i, near) in self.near.iter().enumerate() {
-            if *left >> i & 1 == 1 && near.facing.dot(first.facing) >= alike {
-                *left &= !(1 << i);
-                if let Some(place) = sheet.get_mut(count) {
-                    *place = *near;
-                    count += 1;
-                }
-            }
+    /// The nearest of the points that are left, one bit for each, and the next whose normals are like its own, up to so many. Of
+    /// all that are alike none is left.
+    fn next_sheet(&self, left: &mut u64, alike: f32) -> u64 {
+        let Some(first) = self.near.get(left.trailing_zeros() as usize) else { return 0 };
+        let is_alike = |near: &Near| u64::from(near.facing.dot(first.facing) >= alike);
+        let all = (0..).zip(&self.near).fold(0, |all, (bit, near)| all | is_alike(near) << bit) & *left;
+        *left &= !all;
+        let rest = (0..OF_ONE).fold(all, |rest, _| rest & rest.wrapping_sub(1));
+        all & !rest
+    }
+
+    /// The normal that fits the points of one sheet, one bit for each, best, and how far these lie off it and that is off theirs: by
+    /// least squares, with the mean of their normals as a guess, which is as good as these are alike.
+    fn fit(&self, sheet: u64) -> Option<(f32, Vec3)> {
+        let sheet = || set_bits(sheet).map(|bit| &self.near[bit as usize]);
+        let total: f32 = sheet().map(|near| near.weight).sum();
+        let mean = sheet().map(|near| near.weight * near.facing).sum::<Vec3>().normalize_or_zero();
+        let unlike = sheet().map(|near| near.weight * near.facing.distance_squared(mean)).sum::<f32>() / total;
+        // How far what lies between two points may be off, as a share of how far the normal may be off the mean.
+        let ridge = UNEVEN + ROUNDING / (unlike + LITTLE);
+        // Two of the points, so to speak, it fits anyway.
+        let share = 1.0 / (sheet().count() - 2) as f32;
+        let (mut matrix, mut vector) = (Mat3::from_diagonal(Vec3::splat(ridge)), Vec3::ZERO);
+        for &Near { direction, facing, .. } in sheet() {
+            let across = direction - direction.dot(mean) * mean;
+            matrix += share * Mat3::from_cols(across.x * across, across.y * across, across.z * across);
+            vector -= share * direction.dot(mean + facing) * across;
         }
-        (sheet, count)
+        let tilt = matrix.inverse() * vector;
+        let normal = (mean + tilt).normalize_or(mean);
+        let off = share * sheet().map(|near| near.direction.dot(normal + near.facing).powi(2)).sum::<f32>();
+        let is_theirs = tilt.length_squared() <= OFF * (unlike + ROUNDING);
+        is_theirs.then_some((off + ridge * tilt.length_squared(), normal))
     }
 
     /// Finds the points next to one, in an order that does not depend on theirs.
     fn look(&mut self, point: &Oriented, all: &[Oriented]) -> Result<(), Error> {
-        self.near.clear();
-        grow(&mut self.near, all.len(), WHAT)?;
-        self.near.extend(all.iter().filter_map(|other| {
-            let offset = other.place - point.place;
-            let square = offset.length_squared();
+        let Self { order, near } = self;
+        order.clear();
+        grow(order, all.len(), WHAT)?;
+        order.extend((0u32..).zip(all).filter_map(|(number, other)| {
+            let square = other.place.distance_squared(point.place);
             let tells = square > 0.0 && square <= REACH && other.facing != Vec3::ZERO;
-            tells.then_some(Near { square, offset, facing: other.facing })
+            tells.then_some(u64::from(square.to_bits()) << 32 | u64::from(number))
+        }));
+        keep_nearest(order);
+        sort_few(order, square_of);
+        near.clear();
+        grow(near, order.len(), WHAT)?;
+        near.extend(order.iter().map(|&one| {
+            let (other, square) = (&all[one as u32 as usize], square_of(one));
+            let offset = other.place - point.place;
+            let (direction, weight) = (offset / (square + SOFT).sqrt(), 1.0 / (square + SOFT));
+            Near { square, offset, facing: other.facing, direction, weight }
         }));
         let key = |near: &Near| [near.offset, near.facing].map(|vector| vector.to_array());
-        let tie = |a: &Near, b: &Near| key(a).partial_cmp(&key(b)).unwrap_or(Ordering::Equal);
-        let order = |a: &Near, b: &Near| a.square.total_cmp(&b.square).then_with(|| tie(a, b));
-        if self.near.len() > NEXT {
-            self.near.select_nth_unstable_by(NEXT, order);
-            self.near.truncate(NEXT);
+        for alike in near.chunk_by_mut(|a, b| a.square == b.square).filter(|alike| alike.len() > 1) {
+            alike.sort_unstable_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(Ordering::Equal));
         }
-        self.near.sort_unstable_by(order);
+        near.truncate(NEXT);
         // Copies say no more than one.
-        self.near.dedup_by(|a, b| a.offset == b.offset);
+        near.dedup_by(|a, b| a.offset == b.offset);
         Ok(())
     }
 }
 
-/// The normal that fits some points of one sheet best, and how far these lie off it and that is off theirs: by least squares,
-/// with the mean of their normals as a guess, which is as good as these are alike.
-fn fit(sheet: &[Near]) -> Option<(f32, Vec3)> {
-    let total: f32 = sheet.iter().map(Near::weight).sum();
-    let mean = sheet.iter().map(|near| near.weight() * near.facing).sum::<Vec3>().normalize_or_zero();
-    let unlike = sheet.iter().map(|near| near.weight() * near.facing.distance_squared(mean)).sum::<f32>() / total;
-    // How far what lies between two points may be off, as a share of how far the normal may be off the mean.
-    let ridge = UNEVEN + ROUNDING / (unlike + LITTLE);
-    // Two of the points, so to speak, it fits anyway.
-    let share = 1.0 / (sheet.len() - 2) as f32;
-    let (mut matrix, mut vector) = (Mat3::from_diagonal(Vec3::splat(ridge)), Vec3::ZERO);
-    for near in sheet {
-        let direction = near.direction();
-        let across = direction - direction.dot(mean) * mean;
-        matrix += share * Mat3::from_cols(across.x * across, across.y * across, across.z * across);
-        vector -= share * direction.dot(mean + near.facing) * across;
+/// How far away one of [`Fits::order`] is, squared.
+fn square_of(one: u64) -> f32 {
+    f32::from_bits((one >> 32) as u32)
+}
+
+/// Keeps the [`NEXT`] nearest, and few more: on a surface points are spread evenly over the squares of their distances.
+fn keep_nearest(order: &mut Vec<u64>) {
+    const PARTS: usize = 64;
+    let part = |one: u64| ((PARTS as f32 / REACH * square_of(one)) as usize).min(PARTS - 1);
+    let mut counts = [0; PARTS];
+    order.iter().for_each(|&one| counts[part(one)] += 1);
+    let (mut count, mut last) = (0, 0);
+    while count < NEXT && last < PARTS {
+        count += counts[last];
+        last += 1;
     }
-    let tilt = matrix.inverse() * vector;
-    let normal = (mean + tilt).normalize_or(mean);
-    let off = share * sheet.iter().map(|near| near.direction().dot(normal + near.facing).powi(2)).sum::<f32>();
-    let is_theirs = tilt.length_squared() <= OFF * (unlike + ROUNDING);
-    is_theirs.then_some((off + ridge * tilt.length_squared(), normal))
+    order.retain(|&one| part(one) < last);
 }
 
 #[cfg(test)]

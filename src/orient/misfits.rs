@@ -17,6 +17,7 @@ use crate::points::Points;
 use crate::progress::Stage;
 use crate::surroundings::{Places, Surroundings};
 use glam::Vec3;
+use std::ops::Range;
 
 /// What errors call the memory of all this.
 const WHAT: &str = "the misfits";
@@ -69,7 +70,7 @@ pub(super) fn mend(
         return Ok(());
     }
     let (grid, per_edge) = (&cubes.grid, (1.0 / cubes.edge) as f32);
-    let mut is_stirred = filled(true, grid.cubes(), WHAT)?;
+    let mut changes = None;
     for round in 0..ROUNDS {
         let share = |rounds: usize| rounds as f64 / ROUNDS as f64;
         let cloud = Cloud {
@@ -81,14 +82,18 @@ pub(super) fn mend(
             members,
             signs,
             lines_may_change,
-            is_stirred: &is_stirred,
+            changes: changes.as_ref(),
         };
         let misfits = cloud.misfits(&stage.part(share(round)..share(round + 1)))?;
-        is_stirred.fill(false);
+        let Changes { in_cube, of_point } = changes.insert(Changes {
+            in_cube: filled(false, grid.cubes(), WHAT)?,
+            of_point: filled(false, normals.len(), WHAT)?,
+        });
         for misfit in misfits.iter().flatten() {
             // No negative zeros.
             normals[misfit.point as usize] = Vec3::ZERO + misfit.normal;
-            is_stirred[misfit.cube as usize] = true;
+            in_cube[misfit.cube as usize] = true;
+            of_point[misfit.point as usize] = true;
         }
         let all = || misfits.iter().flatten();
         if all().next().is_none() || TANGLE * all().filter(|misfit| misfit.is_line).count() > normals.len() {
@@ -109,8 +114,14 @@ struct Cloud<'a> {
     members: &'a Members,
     signs: &'a Signs,
     lines_may_change: bool,
-    /// For each cube whether normals of its points changed in the round before.
-    is_stirred: &'a [bool],
+    /// What changed in the round before, if there was one.
+    changes: Option<&'a Changes>,
+}
+
+/// Which normals changed, and in which cubes.
+struct Changes {
+    in_cube: Vec<bool>,
+    of_point: Vec<bool>,
 }
 
 impl Cloud<'_> {
@@ -121,7 +132,7 @@ impl Cloud<'_> {
             let (mut surroundings, mut found) = (Surroundings::new(), Found::default());
             for brick in grid.blocks[block].clone() {
                 surroundings.look(grid, brick);
-                if !surroundings.occupied.all().any(|place| self.is_stirred[surroundings.cube(place)]) {
+                if !surroundings.occupied.all().any(|place| self.is_stirred(surroundings.cube(place))) {
                     continue;
                 }
                 let all = surroundings.occupied.all().flat_map(|place| self.patches.of_cube(surroundings.cube(place)));
@@ -130,6 +141,7 @@ impl Cloud<'_> {
                 if facing.all(|other| one.dot(other) >= HALF_APART) {
                     continue;
                 }
+                found.gathered.clear();
                 for (cube, bit) in (grid.first_cube[brick] as usize..).zip(set_bits(grid.masks[brick])) {
                     self.ask((cube, bit), &surroundings, &mut found)?;
                 }
@@ -138,17 +150,23 @@ impl Cloud<'_> {
         })
     }
 
+    /// Whether normals of the points of a cube changed, or were not asked for.
+    fn is_stirred(&self, cube: usize) -> bool {
+        self.changes.is_none_or(|changes| changes.in_cube[cube])
+    }
+
     /// Finds the misfits of a cube, which has a bit in its brick.
     fn ask(&self, (cube, bit): (usize, u32), surroundings: &Surroundings, found: &mut Found) -> Result<(), Error> {
         let Self { grid, patches, members, .. } = *self;
-        let Found { own, near, planes, fits, misfits } = found;
+        let Found { gathered, own, near, changed, planes, fits, misfits } = found;
         let near_bits = surroundings.occupied.near(bit);
         let places = || set_bits(near_bits).map(|near| Places::of_near(bit, near));
         let cubes = || places().map(|place| surroundings.cube(place));
-        if !cubes().any(|cube| self.is_stirred[cube]) {
+        if !cubes().any(|cube| self.is_stirred(cube)) {
             return Ok(());
         }
         near.clear();
+        changed.clear();
         for (number, patch) in patches.of_cube(cube).enumerate() {
             let facing = self.signs.facing(patches, patch);
             planes.clear();
@@ -166,17 +184,33 @@ impl Cloud<'_> {
             if count > MOST {
                 return Ok(());
             }
-            let Some((first, _)) = members.of_cube(grid, cube).next() else { continue };
+            let gathered_at =
+                |place: usize, gathered: &mut Gathered| gathered.at(place, surroundings.cube(place), self);
+            let range = gathered_at(Places::of_cube(bit), gathered)?;
+            let Some(&Oriented { place: origin, .. }) = gathered.all.get(range.start) else { continue };
+            // As they lie to one of them: so differences are exact, and in edges squares are numbers, whatever the unit.
+            let local = |one: &Oriented| Oriented { place: self.per_edge * (one.place - origin), facing: one.facing };
             let is_own = |membership: Membership| membership.patch().is_some_and(|(own, _)| own == number);
             own.clear();
-            grow(own, grid.points_of(cube).len(), WHAT)?;
-            let all = members.of_cube(grid, cube).filter(|&(_, membership)| is_own(membership));
-            own.extend(all.map(|(point, _)| (point as u32, self.oriented(point, first))));
+            grow(own, range.len(), WHAT)?;
+            let all = members.of_cube(grid, cube).zip(&gathered.all[range]).filter(|((_, member), _)| is_own(*member));
+            own.extend(all.map(|((point, _), one)| (point as u32, local(one))));
             keep_doubtful(own, facing, Places::centre(Places::of_cube(bit)) + patches.all[patch].centre, planes);
             if near.is_empty() && !own.is_empty() {
                 grow(near, count, WHAT)?;
-                let all = cubes().flat_map(|cube| members.of_cube(grid, cube));
-                near.extend(all.map(|(point, _)| self.oriented(point, first)));
+                for place in places() {
+                    let range = gathered_at(place, gathered)?;
+                    near.extend(gathered.all[range.clone()].iter().map(local));
+                    if let Some(changes) = self.changes {
+                        let points = members.of_cube(grid, surroundings.cube(place)).zip(&gathered.all[range]);
+                        let all = points.filter(|&((point, _), _)| changes.of_point[point]);
+                        changed.extend(all.map(|(_, one)| local(one).place));
+                    }
+                }
+            }
+            if self.changes.is_some() {
+                // Of the others all is as it was.
+                own.retain(|(_, one)| changed.iter().any(|place| place.distance_squared(one.place) <= REACH));
             }
             grow(misfits, own.len(), WHAT)?;
             for (point, one) in &*own {
@@ -188,21 +222,56 @@ impl Cloud<'_> {
         }
         Ok(())
     }
+}
 
-    /// A point, as it lies to one near by: so differences are exact, and in edges squares are numbers, whatever the unit.
-    fn oriented(&self, point: usize, origin: usize) -> Oriented {
-        let positions = &self.points.positions;
-        Oriented { place: self.per_edge * (positions[point] - positions[origin]), facing: self.normals[point] }
+/// The points of the cubes in and round a brick, each cube once: they are anywhere in the input, and asked for by all cubes round.
+struct Gathered {
+    /// As they are in the input.
+    all: Vec<Oriented>,
+    /// Where those of a place in [`Surroundings`] begin and end; nowhere if they were not asked for.
+    of_place: [(u32, u32); Places::COUNT],
+}
+
+impl Gathered {
+    fn clear(&mut self) {
+        self.all.clear();
+        self.of_place.fill((0, 0));
+    }
+
+    /// Those of a cube, which is at this place.
+    fn at(&mut self, place: usize, cube: usize, cloud: &Cloud) -> Result<Range<usize>, Error> {
+        let Self { all, of_place } = self;
+        if of_place[place].1 == 0 {
+            let start = all.len() as u32;
+            grow(all, cloud.grid.points_of(cube).len(), WHAT)?;
+            let members = cloud.members.of_cube(cloud.grid, cube);
+            all.extend(
+                members
+                    .map(|(point, _)| Oriented { place: cloud.points.positions[point], facing: cloud.normals[point] }),
+            );
+            of_place[place] = (start, all.len() as u32);
+        }
+        let (start, end) = of_place[place];
+        Ok(start as usize..end as usize)
+    }
+}
+
+impl Default for Gathered {
+    fn default() -> Self {
+        Self { all: Vec::new(), of_place: [(0, 0); Places::COUNT] }
     }
 }
 
 /// What was found in some cubes, and room for the points of one.
 #[derive(Default)]
 struct Found {
+    gathered: Gathered,
     /// Those of a patch that are in doubt, with their numbers.
     own: Vec<(u32, Oriented)>,
     /// All of the 27 cubes, if they were asked for.
     near: Vec<Oriented>,
+    /// Where those of them are whose normals changed in the round before.
+    changed: Vec<Vec3>,
     /// The patches of these that face apart from that one: their middles, in the brick, in edges, and which way they face.
     planes: Vec<Oriented>,
     fits: Fits,
