@@ -247,6 +247,41 @@ fn the_inside_of_a_hollow_body_faces_its_hollow() {
     }
 }
 
+/// The same with walls of ten spacings and more, whose rim has as many points as the rest: from within the wall the inside sees
+/// the outside, and the other way round.
+#[test]
+fn the_inside_of_thick_walls_faces_its_hollow() {
+    for (seed, inner) in [(81, 0.84), (82, 0.8), (83, 0.7), (84, 0.6), (85, 0.4)] {
+        let mut random = Random(seed);
+        let (opening, area) = (0.95f64, |radius: f64| radius * radius);
+        let pick = |random: &mut Random| {
+            // Shares of the spheres without the opening, and of the cone between.
+            let shell = 2.0 * (1.0 + opening);
+            let rim = (1.0 - opening * opening).sqrt() * (1.0 - area(inner));
+            let share = random.unit() * (shell * (1.0 + area(inner)) + rim);
+            if share < rim {
+                let radius = (area(inner) + (1.0 - area(inner)) * random.unit()).sqrt();
+                let ((sin, cos), slant) = ((TAU * random.unit()).sin_cos(), opening.acos());
+                let point = [slant.sin() * cos, slant.sin() * sin, slant.cos()].map(|c| radius * c);
+                return (turn(point), turn([-slant.cos() * cos, -slant.cos() * sin, slant.sin()]));
+            }
+            let direction = loop {
+                let direction = random.direction();
+                if direction[2] < opening {
+                    break direction;
+                }
+            };
+            let (radius, side) = if share < rim + shell { (1.0, 1.0) } else { (inner, -1.0) };
+            (turn(direction.map(|c| radius * c)), turn(direction.map(|c| side * c)))
+        };
+        let ball = Cloud::of((0..60_000).map(|_| pick(&mut random)));
+        for how in [Orient::Consistent, Orient::Outward] {
+            let right = share_right(&orient(&ball.points, how).normals, &ball.normals);
+            assert!(right > 0.9999, "{inner}, {how:?}: {right}");
+        }
+    }
+}
+
 /// Hardly anything but their thickness tells the inside of these from their outside: walls three and a half spacings thick, of a
 /// ball without an opening, and fins two and a half spacings thick and as far apart.
 #[test]

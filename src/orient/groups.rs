@@ -128,34 +128,43 @@ impl Groups {
     pub fn cautious_signs(&self, looks: Option<&Looks>, sights: &Sights, stage: &Stage) -> Result<Vec<bool>, Error> {
         let mut levels = Vec::new();
         if let Some(looks) = looks {
-            let mut links = self.across_the_air(looks, sights)?;
-            reserve(&mut levels, self.levels.len(), GRAPH)?;
-            for (number, Level { group, flipped, .. }) in self.levels.iter().enumerate() {
-                let groups = group.iter().max().map_or(0, |&last| last as usize + 1);
-                let merged = gather(&links, group, flipped, groups, &stage.part(0.0..0.5).part(rest(number)))?;
-                levels.push(std::mem::replace(&mut links, merged));
-            }
+            // But for those at the back of what itself sees the open from its front, as roofs do whose walls are missing.
+            let tells = |look: &Look| !sights.is_back(look.to as usize, look.along < 0.0);
+            levels = self.across(looks, &tells, &stage.part(0.0..0.5))?;
         }
         self.descend(Trust::ByRim, &levels, &stage.part(0.5..1.0))
     }
 
-    /// What the looks of the patches of each component at each other say, but for those at the back of what itself sees the open
-    /// from its front, as roofs do whose walls are missing.
-    fn across_the_air(&self, looks: &Looks, sights: &Sights) -> Result<Links, Error> {
-        let weight = LOOK * looks.step as f32;
-        let told = looks.all.iter().filter(|&&Look { from, to, along, .. }| {
-            let is_own = self.component[from as usize] == self.component[to as usize];
-            is_own && !sights.is_back(to as usize, along < 0.0)
-        });
-        let link = |look: &Look| (look.from, Link { to: look.to, evidence: weight * look.evidence() });
-        Links::both_ways(self.component.len(), told.map(link))
+    /// Signs with these looks, too. Only groups of some size are flipped for them, because some go astray.
+    pub fn signs_with(&self, looks: &Looks, stage: &Stage) -> Result<Vec<bool>, Error> {
+        let mut levels = self.across(looks, &|_| true, &stage.part(0.0..0.5))?;
+        levels.drain(..SMALL_GROUPS.min(levels.len()));
+        self.descend(Trust::Times(1.0), &levels, &stage.part(0.5..1.0))
     }
 
-    /// From the components to the patches: whatever gains by being flipped is. `across`: links across the air for each level, or
-    /// none.
+    /// What the looks of the patches of each component at each other say: for each level links between its groups.
+    fn across(&self, looks: &Looks, tells: &dyn Fn(&Look) -> bool, stage: &Stage) -> Result<Vec<Links>, Error> {
+        let weight = LOOK * looks.step as f32;
+        let is_own = |look: &Look| self.component[look.from as usize] == self.component[look.to as usize];
+        let link = |look: &Look| (look.from, Link { to: look.to, evidence: weight * look.evidence() });
+        let told = looks.all.iter().filter(|look| is_own(look) && tells(look)).map(link);
+        let mut links = Links::both_ways(self.component.len(), told)?;
+        let mut levels = Vec::new();
+        reserve(&mut levels, self.levels.len(), GRAPH)?;
+        for (number, Level { group, flipped, .. }) in self.levels.iter().enumerate() {
+            let groups = group.iter().max().map_or(0, |&last| last as usize + 1);
+            let merged = gather(&links, group, flipped, groups, &stage.part(rest(number)))?;
+            levels.push(std::mem::replace(&mut links, merged));
+        }
+        Ok(levels)
+    }
+
+    /// From the components to the patches: whatever gains by being flipped is. `across`: links across the air for the last of the
+    /// levels, those of the largest groups.
     fn descend(&self, trust: Trust, across: &[Links], stage: &Stage) -> Result<Vec<bool>, Error> {
         let mut flipped = filled(false, self.own.len(), GRAPH)?;
         flipped.iter_mut().zip(&self.own).for_each(|(flipped, own)| *flipped = *own < 0.0);
+        let first = self.levels.len() - across.len();
         for (number, Level { links, own, sizes, group, flipped: within }) in self.levels.iter().enumerate().rev() {
             let mut finer = filled(false, group.len(), GRAPH)?;
             for ((finer, &group), within) in finer.iter_mut().zip(group).zip(within) {
@@ -167,7 +176,8 @@ impl Groups {
                 Trust::ByRim => own[one] / (sizes[one] as f32).sqrt(),
             };
             let Range { start, end } = rest(number);
-            mend(links, across.get(number), &share, &mut flipped, &stage.part(1.0 - end..1.0 - start))?;
+            let across = number.checked_sub(first).map(|number| &across[number]);
+            mend(links, across, &share, &mut flipped, &stage.part(1.0 - end..1.0 - start))?;
         }
         Ok(flipped)
     }
@@ -199,6 +209,9 @@ const BOLDNESS: f32 = 3.0;
 
 /// What a look that hits head-on counts against links that count up to 1.
 const LOOK: f32 = 0.2;
+
+/// The first levels, of which groups may have fewer patches than some eight.
+const SMALL_GROUPS: usize = 3;
 
 /// What the evidence says to the sign of one, given those of the others.
 fn support(links: &Links, flipped: &[bool], one: usize) -> f32 {

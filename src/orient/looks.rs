@@ -50,6 +50,15 @@ impl Looks {
         Self::of(grid, patches, &|patch| sights.open_side(patch))
     }
 
+    /// Of some patches, from both sides.
+    pub fn from_both_sides(grid: &Grid, patches: &Patches, is_one: &dyn Fn(usize) -> bool) -> Result<Self, Error> {
+        let from = |is_against: bool| Self::of(grid, patches, &|patch| is_one(patch).then_some(is_against));
+        let (mut looks, mut others) = (from(false)?, from(true)?);
+        grow(&mut looks.all, others.all.len(), WHAT)?;
+        looks.all.append(&mut others.all);
+        Ok(looks)
+    }
+
     /// Of the patches for which `side` answers whether they look out against their normal: in 26 directions, past air, at the
     /// patches of the first occupied cube.
     pub fn of(grid: &Grid, patches: &Patches, side: &dyn Fn(usize) -> Option<bool>) -> Result<Self, Error> {

@@ -147,7 +147,7 @@ fn surfaces(
     let groups = Groups::of(links, &sights, &patches, &stage.part(0.7..0.8))?;
     let choosing = stage.part(0.8..0.9);
     let (choice, looks, scanner) = match options.orient {
-        Orient::Outward => (outward((groups, walls), &patches, &sights, &choosing)?, None, None),
+        Orient::Outward => (outward((groups, walls), (grid, *noise), &patches, &sights, &choosing)?, None, None),
         _ => consistent((groups, walls), &ball, &cubes, &patches, &sights, &choosing)?,
     };
     let (mut signs, links) = choice.into_signs();
@@ -190,12 +190,13 @@ enum Scanner {
 
 /// Signs that count all of the open, but of what is not closed a share: much of that sees the open with its inside.
 fn outward(
-    (groups, walls): (Groups, Vec<Pair>),
+    groups: (Groups, Vec<Pair>),
+    (grid, noise): (&Grid, f32),
     patches: &Patches,
     sights: &Sights,
     stage: &Stage,
 ) -> Result<Choice, Error> {
-    let mut choice = Choice::of(groups, walls, patches, sights, &stage.part(0.0..0.6))?;
+    let mut choice = Choice::of(groups, (grid, noise), patches, sights, &stage.part(0.0..0.6))?;
     if choice.is_any_open() {
         choice.be_cautious(None, sights, &stage.part(0.6..1.0))?;
     }
@@ -206,7 +207,7 @@ fn outward(
 /// each other; but not where all was seen from one place, because that is open all over behind, and the hollow side of it looks
 /// at itself. Also these looks, if there is anything that is not closed, and the scanner or several, if these saw all.
 fn consistent(
-    (groups, walls): (Groups, Vec<Pair>),
+    groups: (Groups, Vec<Pair>),
     ball: &Ball,
     cubes: &Cubes,
     patches: &Patches,
@@ -214,7 +215,7 @@ fn consistent(
     stage: &Stage,
 ) -> Result<(Choice, Option<Looks>, Option<Scanner>), Error> {
     let (grid, noise) = (&cubes.grid, cubes.noise);
-    let mut choice = Choice::of(groups, walls, patches, sights, &stage.part(0.0..0.6))?;
+    let mut choice = Choice::of(groups, (grid, noise), patches, sights, &stage.part(0.0..0.6))?;
     let mut looks = None;
     if choice.is_any_open() {
         looks = Some(Looks::from_the_open(grid, patches, sights)?);

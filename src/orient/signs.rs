@@ -7,6 +7,7 @@ use super::links::{Links, Pair};
 use super::looks::Looks;
 use super::patches::{Patches, signed};
 use crate::error::Error;
+use crate::grid::Grid;
 use crate::lists::{filled, fitted};
 use crate::progress::Stage;
 use glam::Vec3;
@@ -41,6 +42,9 @@ const WALLED: f64 = 0.8;
 /// With less of the open for each patch a surface hardly sees it: the sides of fins as far apart as thick have 0.02.
 const BLIND: f64 = 0.1;
 
+/// In so much noise, in edges, what looks through a surface and what stands before it are not told apart.
+const NOISY: f32 = 0.12;
+
 /// Open surfaces of fewer patches are not worth the time that they take beyond that of closed ones, and such a share of all
 /// patches.
 pub(super) const LEAST_PATCHES: u64 = 32;
@@ -58,10 +62,11 @@ pub(super) struct Choice {
 
 impl Choice {
     /// Counts all that lies in the open, and what the two sides of `walls` say where that is not open: of a closed body one leads
-    /// in and the other one out, but of leaves and the ground both may be seen from above.
+    /// in and the other one out, but of leaves and the ground both may be seen from above. If noise, in edges, allows it, parts of
+    /// closed surfaces that hardly see the open are also told by what they see of the others.
     pub fn of(
-        mut groups: Groups,
-        mut walls: Vec<Pair>,
+        (mut groups, mut walls): (Groups, Vec<Pair>),
+        (grid, noise): (&Grid, f32),
         patches: &Patches,
         sights: &Sights,
         stage: &Stage,
@@ -75,10 +80,15 @@ impl Choice {
         }
         if !walls.is_empty() {
             drop(flipped);
-            groups = groups.with(walls, sights, patches, &stage.part(0.3..0.7))?;
-            flipped = groups.signs(&stage.part(0.7..1.0))?;
+            groups = groups.with(walls, sights, patches, &stage.part(0.3..0.6))?;
+            flipped = groups.signs(&stage.part(0.6..0.8))?;
         }
         let is_closed = closed(&groups, sights, &flipped)?;
+        let is_hidden = |patch: usize| is_closed[groups.component[patch] as usize] && sights.all[patch] < BLIND as f32;
+        if noise < NOISY && (0..patches.all.len()).filter(|&patch| is_hidden(patch)).count() as u64 >= LEAST_PATCHES {
+            let looks = Looks::from_both_sides(grid, patches, &is_hidden)?;
+            flipped = groups.signs_with(&looks, &stage.part(0.8..1.0))?;
+        }
         let (mut open, mut all) = (0.0, 0.0);
         for (patch, &component) in patches.all.iter().zip(&groups.component) {
             let points = f64::from(patch.points);
