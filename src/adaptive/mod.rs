@@ -25,6 +25,7 @@ use crate::lists::grow;
 use crate::normals::{Found, Normals};
 use crate::options::Options;
 use crate::points::Points;
+use crate::power::exp2;
 use crate::progress::{Progress, Stage};
 use crate::rounding::Rounding;
 use crate::source::Source;
@@ -214,5 +215,5 @@ const BATCH: usize = 1 << 16;
 
 /// Of a stage in parts that each take half of what is left, the `i`th, from 1.
 fn halving(i: i32) -> Range<f64> {
-    1.0 - 0.5f64.powi(i - 1)..1.0 - 0.5f64.powi(i)
+    1.0 - exp2(1.0 - f64::from(i))..1.0 - exp2(-f64::from(i))
 }

@@ -2,6 +2,7 @@
 
 use super::choose::Chosen;
 use super::{DIVISIONS, SIZES};
+use crate::power::exp2;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// Points, counted. Whole numbers: in whatever order threads add them, the sums are the same.
@@ -51,7 +52,7 @@ impl Tally {
 
     /// Edges of the chosen cubes in edges of the base, and how many points took each. The smallest first.
     pub fn scales(&self) -> Vec<(f64, u64)> {
-        let edges = (0i32..).map(|i| 2f64.powi(i - DIVISIONS as i32));
+        let edges = (0i32..).map(|i| exp2(f64::from(i - DIVISIONS as i32)));
         edges
             .zip(&self.sizes)
             .map(|(edge, count)| (edge, count.load(Relaxed)))
