@@ -4,7 +4,7 @@
 //! noise that are no surfaces. How exactly points lie on these tells nothing.
 
 /// Steps are coarse that are as wide as this share of the edge of a cube with 32 points: of a surface with such a spacing between
-/// them that eight are an edge, a third of that. With half of it planes of steps pass for faces.
+/// them that eight are an edge, a third of that. Planes of wider steps pass for faces.
 const COARSE: f64 = 1.0 / 24.0;
 
 /// And fine if they are narrower than this, a sixth of the spacing: surfaces are not known any better than such coordinates.
@@ -15,12 +15,13 @@ const FINE: f64 = 1.0 / 48.0;
 pub(crate) struct Rounding {
     /// The variance that a coordinate has from that, in edges and squared; 0 if it is next to nothing.
     pub variance: f32,
-    /// Whether steps are hardly narrower than the spacing of the points.
+    /// Whether steps are wider than about a third of the spacing of the points.
     pub is_coarse: bool,
 }
 
 impl Rounding {
-    /// To steps, of points that are so dense that cubes of [`crate::cell::POINTS_PER_CELL`] have an edge.
+    /// To steps, of points that are so dense that cubes of [`crate::cell::POINTS_PER_CELL`] have this edge. In clouds of fewer than
+    /// 1600 points, the cubes of which hold fewer, narrower steps count.
     #[inline(always)]
     pub fn of(step: f64, edge: f64) -> Self {
         let share = step / edge;
@@ -55,7 +56,7 @@ mod tests {
     }
 
     #[test]
-    fn coarse_are_steps_that_are_hardly_narrower_than_the_spacing() {
+    fn coarse_are_steps_of_a_third_of_the_spacing() {
         let is_coarse_to = |points: u32, step: f32| is_coarse_of(points, |_, place| (place / step).round() * step);
         for points in [1000, 100_000] {
             assert!([0.5, 1.0, 2.0, 5.0].into_iter().all(|step| is_coarse_to(points, step)), "{points}");

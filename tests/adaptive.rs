@@ -228,7 +228,6 @@ fn noise_is_not_divided() {
     assert!(error < 6.36 && result.report.cells < 10_000, "{error} degrees, {} cubes", result.report.cells);
 }
 
-/// Waves shorter than the cubes that 'auto' begins with, ten point spacings.
 /// Floors that are nearly level, and whatever else, of coordinates in steps of a third of the spacing and more.
 #[test]
 fn steps_of_rounded_coordinates_are_noise() {
@@ -254,6 +253,7 @@ fn steps_of_rounded_coordinates_are_noise() {
     }
 }
 
+/// Waves shorter than the cubes that 'auto' begins with, ten point spacings.
 #[test]
 fn corrugations_are_no_noise() {
     let mut random = Random(22);

@@ -247,8 +247,8 @@ fn the_inside_of_a_hollow_body_faces_its_hollow() {
     }
 }
 
-/// The same with walls of ten spacings and more, whose rim has as many points as the rest: from within the wall the inside sees
-/// the outside, and the other way round.
+/// The same with walls of eight spacings and more, whose rim is covered as densely as the rest: through the wall the inside sees
+/// the outside.
 #[test]
 fn the_inside_of_thick_walls_faces_its_hollow() {
     for (seed, inner) in [(81, 0.84), (82, 0.8), (83, 0.7), (84, 0.6), (85, 0.4)] {

@@ -62,7 +62,6 @@ impl Oriented {
 }
 
 /// One next to the point that is asked about.
-#[derive(Clone, Copy, Default)]
 struct Near {
     /// How far away, in edges and squared.
     square: f32,

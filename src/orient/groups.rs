@@ -135,11 +135,27 @@ impl Groups {
         self.descend(Trust::ByRim, &levels, &stage.part(0.5..1.0))
     }
 
-    /// Signs with these looks, too. Only groups of some size are flipped for them, because some go astray.
-    pub fn signs_with(&self, looks: &Looks, stage: &Stage) -> Result<Vec<bool>, Error> {
+    /// Takes signs with these looks, too, of the components that so have a better sum of all evidence. Only groups of some size are
+    /// flipped for looks, because some go astray, and of larger ones where one look stands for those of several patches.
+    pub fn mend_with(&self, looks: &Looks, flipped: &mut [bool], stage: &Stage) -> Result<(), Error> {
+        let Some(Level { links, own, .. }) = self.levels.first() else { return Ok(()) };
         let mut levels = self.across(looks, &|_| true, &stage.part(0.0..0.5))?;
-        levels.drain(..SMALL_GROUPS.min(levels.len()));
-        self.descend(Trust::Times(1.0), &levels, &stage.part(0.5..1.0))
+        let small = SMALL_GROUPS + looks.step.next_power_of_two().ilog2() as usize / 2;
+        let first = levels.drain(..small.min(levels.len())).next();
+        let Some(told) = first else { return Ok(()) };
+        let other = self.descend(Trust::Times(1.0), &levels, &stage.part(0.5..1.0))?;
+        let mut gains = filled(0.0, self.components(), GRAPH)?;
+        for (one, &component) in self.component.iter().enumerate() {
+            let sum =
+                |flipped: &[bool]| score(links, own, flipped, one) + f64::from(support(&told, flipped, one)) / 2.0;
+            gains[component as usize] += sum(&other) - sum(flipped);
+        }
+        for ((flipped, other), &component) in flipped.iter_mut().zip(other).zip(&self.component) {
+            if gains[component as usize] > 0.0 {
+                *flipped = other;
+            }
+        }
+        Ok(())
     }
 
     /// What the looks of the patches of each component at each other say: for each level links between its groups.
@@ -159,8 +175,8 @@ impl Groups {
         Ok(levels)
     }
 
-    /// From the components to the patches: whatever gains by being flipped is. `across`: links across the air for the last of the
-    /// levels, those of the largest groups.
+    /// From the components to the patches: whatever gains by being flipped is. `across`: links by looks for the last of the levels,
+    /// those of the largest groups.
     fn descend(&self, trust: Trust, across: &[Links], stage: &Stage) -> Result<Vec<bool>, Error> {
         let mut flipped = filled(false, self.own.len(), GRAPH)?;
         flipped.iter_mut().zip(&self.own).for_each(|(flipped, own)| *flipped = *own < 0.0);

@@ -1,4 +1,4 @@
-//! What patches see of each other across the air.
+//! What patches see of each other across the air, or through the body behind them.
 
 use super::air::{DIRECTIONS, Sights, direction, hidden};
 use super::patches::{Patches, signed};

@@ -85,19 +85,23 @@ pub(super) fn mend(
             changes: changes.as_ref(),
         };
         let misfits = cloud.misfits(&stage.part(share(round)..share(round + 1)))?;
+        let all = || misfits.iter().flatten();
+        for misfit in all() {
+            // No negative zeros.
+            normals[misfit.point as usize] = Vec3::ZERO + misfit.normal;
+        }
+        if all().next().is_none() || TANGLE * all().filter(|misfit| misfit.is_line).count() > normals.len() {
+            break;
+        }
+        // Not beside those of the round before.
+        drop(changes.take());
         let Changes { in_cube, of_point } = changes.insert(Changes {
             in_cube: filled(false, grid.cubes(), WHAT)?,
             of_point: filled(false, normals.len(), WHAT)?,
         });
-        for misfit in misfits.iter().flatten() {
-            // No negative zeros.
-            normals[misfit.point as usize] = Vec3::ZERO + misfit.normal;
+        for misfit in all() {
             in_cube[misfit.cube as usize] = true;
             of_point[misfit.point as usize] = true;
-        }
-        let all = || misfits.iter().flatten();
-        if all().next().is_none() || TANGLE * all().filter(|misfit| misfit.is_line).count() > normals.len() {
-            break;
         }
     }
     Ok(())
@@ -198,6 +202,7 @@ impl Cloud<'_> {
             keep_doubtful(own, facing, Places::centre(Places::of_cube(bit)) + patches.all[patch].centre, planes);
             if near.is_empty() && !own.is_empty() {
                 grow(near, count, WHAT)?;
+                grow(changed, count, WHAT)?;
                 for place in places() {
                     let range = gathered_at(place, gathered)?;
                     near.extend(gathered.all[range.clone()].iter().map(local));
@@ -209,7 +214,7 @@ impl Cloud<'_> {
                 }
             }
             if self.changes.is_some() {
-                // Of the others all is as it was.
+                // Of the others what tells is as it was.
                 own.retain(|(_, one)| changed.iter().any(|place| place.distance_squared(one.place) <= REACH));
             }
             grow(misfits, own.len(), WHAT)?;

@@ -3,7 +3,7 @@
 //! `docs/orientation.md` explains the rule, its sources and its limits. In short: the points of each small cube are parted into
 //! patches ([`patches`]), a patch and those round it say whether their signs agree ([`links`]), and so do the two sides of a
 //! wall ([`walls`]), which sides of a patch are open to the air says which way is out ([`air`]), and the signs are chosen that
-//! these agree with best ([`groups`]), of open surfaces also what their parts see of each other ([`looks`]). These then face
+//! these agree with best ([`groups`]), of open surfaces and of hidden parts also what they see of each other ([`looks`]). These then face
 //! what stands before them ([`facing`]), or the scanner, if one saw all: where it stood, if densities tell that ([`station`]),
 //! or the direction from which it did ([`view`]), or several that stood amid them ([`stations`]). Of a few points that are no
 //! surface, what is round them tells the side ([`specks`]). In noise normals then become means of those about them ([`means`]),

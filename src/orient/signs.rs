@@ -87,7 +87,7 @@ impl Choice {
         let is_hidden = |patch: usize| is_closed[groups.component[patch] as usize] && sights.all[patch] < BLIND as f32;
         if noise < NOISY && (0..patches.all.len()).filter(|&patch| is_hidden(patch)).count() as u64 >= LEAST_PATCHES {
             let looks = Looks::from_both_sides(grid, patches, &is_hidden)?;
-            flipped = groups.signs_with(&looks, &stage.part(0.8..1.0))?;
+            groups.mend_with(&looks, &mut flipped, &stage.part(0.8..1.0))?;
         }
         let (mut open, mut all) = (0.0, 0.0);
         for (patch, &component) in patches.all.iter().zip(&groups.component) {
