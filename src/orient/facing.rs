@@ -2,7 +2,7 @@
 
 use super::air::Sights;
 use super::components::{Decision, Side};
-use super::looks::{Look, Looks, Votes};
+use super::looks::{LOOKERS, Look, Looks, Votes};
 use super::patches::{Patches, signed};
 use super::signs::{LEAST_PATCHES, Signs};
 use crate::error::Error;
@@ -122,7 +122,7 @@ pub(super) fn turn_to_what_looks(
         }
         stage.tell(round as f64 / ROUNDS as f64)?;
         let front_side = |patch: usize| fresh[component(signs, patch)].then_some(signs.flipped[patch]);
-        let looks = Looks::of(grid, patches, &front_side)?;
+        let looks = Looks::of(grid, patches, LOOKERS, &front_side)?;
         let looked = looked_at(&looks, signs, decisions, &is_settled, &|_| true)?;
         fresh = tell(looked, looks.step, ONE_SIDED_LATER, signs, decisions, &mut is_settled)?;
     }

@@ -12,7 +12,10 @@ use glam::IVec3;
 const WHAT: &str = "the looks across the air";
 
 /// Patches that look out at once at the most: enough to tell every larger surface, and the rays do not grow with the points.
-const LOOKERS: usize = 4096;
+pub(super) const LOOKERS: usize = 4096;
+
+/// The same of hidden ones, from both sides: they tell large parts only.
+const HIDDEN: usize = 1024;
 
 /// How far they look, in steps from cube to cube.
 const REACH: i32 = 1024;
@@ -47,12 +50,12 @@ pub(super) struct Looks {
 impl Looks {
     /// Of patches in the open, from the side that is.
     pub fn from_the_open(grid: &Grid, patches: &Patches, sights: &Sights) -> Result<Self, Error> {
-        Self::of(grid, patches, &|patch| sights.open_side(patch))
+        Self::of(grid, patches, LOOKERS, &|patch| sights.open_side(patch))
     }
 
     /// Of some patches, from both sides.
     pub fn from_both_sides(grid: &Grid, patches: &Patches, is_one: &dyn Fn(usize) -> bool) -> Result<Self, Error> {
-        let from = |is_against: bool| Self::of(grid, patches, &|patch| is_one(patch).then_some(is_against));
+        let from = |is_against: bool| Self::of(grid, patches, HIDDEN, &|patch| is_one(patch).then_some(is_against));
         let (mut looks, mut others) = (from(false)?, from(true)?);
         grow(&mut looks.all, others.all.len(), WHAT)?;
         looks.all.append(&mut others.all);
@@ -60,10 +63,15 @@ impl Looks {
     }
 
     /// Of the patches for which `side` answers whether they look out against their normal: in 26 directions, past air, at the
-    /// patches of the first occupied cube.
-    pub fn of(grid: &Grid, patches: &Patches, side: &dyn Fn(usize) -> Option<bool>) -> Result<Self, Error> {
+    /// patches of the first occupied cube. At the `most` so many of them look.
+    pub fn of(
+        grid: &Grid,
+        patches: &Patches,
+        most: usize,
+        side: &dyn Fn(usize) -> Option<bool>,
+    ) -> Result<Self, Error> {
         let rays = Rays::through(grid);
-        let step = (0..patches.all.len()).filter(|&patch| side(patch).is_some()).count().div_ceil(LOOKERS);
+        let step = (0..patches.all.len()).filter(|&patch| side(patch).is_some()).count().div_ceil(most);
         let (mut all, mut lookers) = (Vec::new(), 0);
         for (brick, cube, bit) in (0..grid.blocks.len()).flat_map(|block| grid.cubes_in(block)) {
             let place = BRICK * grid.bricks.places[brick] + cube_place(bit);
