@@ -105,15 +105,7 @@ impl Groups {
         if bold == flipped {
             return Ok(flipped);
         }
-        let mut gains = filled(0.0, self.components(), GRAPH)?;
-        for (one, &component) in self.component.iter().enumerate() {
-            gains[component as usize] += score(links, own, &bold, one) - score(links, own, &flipped, one);
-        }
-        for ((flipped, bold), &component) in flipped.iter_mut().zip(bold).zip(&self.component) {
-            if gains[component as usize] > 0.0 {
-                *flipped = bold;
-            }
-        }
+        self.take_better(&mut flipped, &bold, &|flipped, one| score(links, own, flipped, one))?;
         mend(links, None, &|one| own[one], &mut flipped, &stage.part(0.8..1.0))?;
         Ok(flipped)
     }
@@ -144,13 +136,25 @@ impl Groups {
         let first = levels.drain(..small.min(levels.len())).next();
         let Some(told) = first else { return Ok(()) };
         let other = self.descend(Trust::Times(1.0), &levels, &stage.part(0.5..1.0))?;
+        // The share of a patch in all evidence, half of that of each look.
+        let share = |flipped: &[bool], one: usize| {
+            score(links, own, flipped, one) + f64::from(support(&told, flipped, one)) / 2.0
+        };
+        self.take_better(flipped, &other, &share)
+    }
+
+    /// Takes other signs for the components that so have a better sum of evidence, of which `share` tells that of one patch.
+    fn take_better(
+        &self,
+        flipped: &mut [bool],
+        other: &[bool],
+        share: &dyn Fn(&[bool], usize) -> f64,
+    ) -> Result<(), Error> {
         let mut gains = filled(0.0, self.components(), GRAPH)?;
         for (one, &component) in self.component.iter().enumerate() {
-            let sum =
-                |flipped: &[bool]| score(links, own, flipped, one) + f64::from(support(&told, flipped, one)) / 2.0;
-            gains[component as usize] += sum(&other) - sum(flipped);
+            gains[component as usize] += share(other, one) - share(flipped, one);
         }
-        for ((flipped, other), &component) in flipped.iter_mut().zip(other).zip(&self.component) {
+        for ((flipped, &other), &component) in flipped.iter_mut().zip(other).zip(&self.component) {
             if gains[component as usize] > 0.0 {
                 *flipped = other;
             }
