@@ -79,7 +79,7 @@ pub(crate) fn edge_of_size(size: f64, unit: f64, paper: f64) -> Result<f64, Erro
 pub(crate) struct Density {
     /// The middle of the bulk.
     pub middle: DVec3,
-    /// The step that coordinates were rounded to, if they were ([`Bulk::step`]).
+    /// The step that coordinates were rounded to, if they were, along the axes that they have here ([`Bulk::step`]).
     pub step: f64,
     /// Points of the cloud.
     count: usize,

@@ -114,8 +114,8 @@ export interface Report {
   scale: number;
   /**
    * How far the points lie off the surfaces that were chosen for them, in the units of the input: the deviation that half
-   * of them do not exceed, to 2 %; 0 if there is no surface. No less than coordinates are off by that
-   * were rounded to more than a sixth of the spacing. Only with `cell: 'auto'`.
+   * of them do not exceed, to 2 %; 0 if there is no surface. No less than coordinates are off by that were
+   * rounded to more than a sixth of the spacing. Only with `cell: 'auto'`.
    */
   noise?: number;
   /**
