@@ -191,26 +191,23 @@ impl Cloud<'_> {
             let gathered_at =
                 |place: usize, gathered: &mut Gathered| gathered.at(place, surroundings.cube(place), self);
             let range = gathered_at(Places::of_cube(bit), gathered)?;
-            let Some(&Oriented { place: origin, .. }) = gathered.all.get(range.start) else { continue };
+            let Some(&(Oriented { place: origin, .. }, _)) = gathered.all.get(range.start) else { continue };
             // As they lie to one of them: so differences are exact, and in edges squares are numbers, whatever the unit.
             let local = |one: &Oriented| Oriented { place: self.per_edge * (one.place - origin), facing: one.facing };
             let is_own = |membership: Membership| membership.patch().is_some_and(|(own, _)| own == number);
             own.clear();
             grow(own, range.len(), WHAT)?;
             let all = members.of_cube(grid, cube).zip(&gathered.all[range]).filter(|((_, member), _)| is_own(*member));
-            own.extend(all.map(|((point, _), one)| (point as u32, local(one))));
+            own.extend(all.map(|((point, _), (one, _))| (point as u32, local(one))));
             keep_doubtful(own, facing, Places::centre(Places::of_cube(bit)) + patches.all[patch].centre, planes);
             if near.is_empty() && !own.is_empty() {
                 grow(near, count, WHAT)?;
                 grow(changed, count, WHAT)?;
                 for place in places() {
                     let range = gathered_at(place, gathered)?;
-                    near.extend(gathered.all[range.clone()].iter().map(local));
-                    if let Some(changes) = self.changes {
-                        let points = members.of_cube(grid, surroundings.cube(place)).zip(&gathered.all[range]);
-                        let all = points.filter(|&((point, _), _)| changes.of_point[point]);
-                        changed.extend(all.map(|(_, one)| local(one).place));
-                    }
+                    let all = &gathered.all[range];
+                    near.extend(all.iter().map(|(one, _)| local(one)));
+                    changed.extend(all.iter().filter(|(_, has_changed)| *has_changed).map(|(one, _)| local(one).place));
                 }
             }
             if self.changes.is_some() {
@@ -231,8 +228,8 @@ impl Cloud<'_> {
 
 /// The points of the cubes in and round a brick, each cube once: they are anywhere in the input, and asked for by all cubes round.
 struct Gathered {
-    /// As they are in the input.
-    all: Vec<Oriented>,
+    /// As they are in the input, and whether their normals changed in the round before.
+    all: Vec<(Oriented, bool)>,
     /// Where those of a place in [`Surroundings`] begin and end; nowhere if they were not asked for.
     of_place: [(u32, u32); Places::COUNT],
 }
@@ -249,11 +246,10 @@ impl Gathered {
         if of_place[place].1 == 0 {
             let start = all.len() as u32;
             grow(all, cloud.grid.points_of(cube).len(), WHAT)?;
-            let members = cloud.members.of_cube(cloud.grid, cube);
-            all.extend(
-                members
-                    .map(|(point, _)| Oriented { place: cloud.points.positions[point], facing: cloud.normals[point] }),
-            );
+            all.extend(cloud.members.of_cube(cloud.grid, cube).map(|(point, _)| {
+                let one = Oriented { place: cloud.points.positions[point], facing: cloud.normals[point] };
+                (one, cloud.changes.is_some_and(|changes| changes.of_point[point]))
+            }));
             of_place[place] = (start, all.len() as u32);
         }
         let (start, end) = of_place[place];
